@@ -1,0 +1,94 @@
+"""The frame every stage's `main` hangs in: arguments, log, cost, and plain errors on the terminal.
+
+A stage is `main(argv) = run(__doc__, arguments, body, argv)`: `arguments(parser)` names its files and settings, `body(args, cost)` loads,
+calls and saves.  Every stage takes `--log FILE` (messages, beside the result) and `--cost FILE` (seconds, memory, rays as JSON).
+"""
+
+import argparse
+import json
+import os
+import resource
+import sys
+import time
+import traceback
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from lib.formats.artefact import ArtefactError, write_json
+from lib.refusal import Refusal
+
+
+@dataclass
+class Cost:
+    """What a job spent: rays are counted by the stage, times and memory by the door; `notes` are savings worth a number."""
+
+    stage: str
+    rays: int = 0
+    notes: dict = field(default_factory=dict)
+    started: float = field(default_factory=time.monotonic)
+
+    def as_dict(self):
+        """The JSON record: wall and CPU seconds of this process (children included), peak memory in MB, rays."""
+        usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+        return {
+            "stage": self.stage,
+            "seconds": round(time.monotonic() - self.started, 4),
+            "cpu_seconds": round(sum(u.ru_utime + u.ru_stime for u in usage), 4),
+            "peak_mb": round(max(u.ru_maxrss for u in usage) / 1024, 1),
+            "rays": int(self.rays),
+            "notes": self.notes,
+            "run": os.environ.get("BAKE_RUN", ""),
+        }
+
+
+class _Log:
+    """Where messages go besides the terminal; one per call of `run`, none outside."""
+
+    def __init__(self, path):
+        self.path = path
+        if path:
+            Path(path).parent.mkdir(parents=True, exist_ok=True)
+            Path(path).write_text("", encoding="utf-8")
+
+    def add(self, text):
+        if self.path:
+            with open(self.path, "a", encoding="utf-8") as file:
+                file.write(text + "\n")
+
+
+_open_logs = []
+
+
+def warn(text):
+    """Print a warning to the terminal and the log of the stage that is running."""
+    line = f"warning: {text}"
+    print(line, file=sys.stderr, flush=True)
+    for log in _open_logs[-1:]:
+        log.add(line)
+
+
+def run(doc, arguments, body, argv=None):
+    """Run a stage; return its exit status: 0, or 1 after one plain line that says why."""
+    parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)
+    arguments(parser)
+    parser.add_argument("--log", metavar="FILE", help="messages, also printed to the terminal")
+    parser.add_argument("--cost", metavar="FILE", help="JSON: seconds, memory and rays of this job")
+    args = parser.parse_args(argv)
+    cost = Cost(stage=Path(sys.modules[body.__module__].__file__ or "stage").stem)
+    log = _Log(args.log)
+    _open_logs.append(log)
+    try:
+        body(args, cost)
+    except (Refusal, ArtefactError) as error:
+        print(str(error), file=sys.stderr, flush=True)
+        log.add(str(error))
+        return 1
+    except Exception:  # a fault of ours: the whole story goes to the terminal and to the log
+        log.add(traceback.format_exc())
+        raise
+    finally:
+        _open_logs.pop()
+    if args.cost:
+        write_json(args.cost, cost.as_dict())
+    log.add(json.dumps(cost.as_dict()))
+    return 0
