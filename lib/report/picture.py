@@ -1,0 +1,181 @@
+"""A picture of a textured mesh as an unlit viewer shows it: one first hit a ray, bilinear texture lookups, no light.
+
+The bake is in the textures, so this picture is what every viewer of the exported files draws, and a wrong texture
+coordinate, a flipped face or a seam shows up in it.
+
+Conventions: world y up (glTF). Texture coordinates are glTF's: s, t in [0, 1] from the upper left corner of the
+picture, row 0 is its upper row, texel centres at +0.5. Filtering and averaging happen in linear light, as a viewer with
+sRGB textures does it; the sRGB curve comes last.
+"""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from lib.maps.colour import linear_to_srgb, srgb_to_linear
+from lib.visibility import closest
+
+RAYS_AT_ONCE = 1 << 17
+THROUGH = 12  # culled faces a ray may pass before it counts as missed
+STEP = 1e-6  # a ray goes on behind a culled face by this part of the scene's size (float32 ray tracer: about 8 ulp)
+BACKGROUND = (0.16, 0.17, 0.18)  # sRGB; dark enough to set off a lit room, not mistaken for a black surface
+
+
+@dataclass(frozen=True)
+class Part:
+    """One drawn piece of mesh.
+
+    V (n_v, 3) float64 metres, y up; F (n_f, 3) int; ST (n_v, 2) float64 texture coordinates or None; colour (n_v, 3)
+    float64 linear vertex colours or None; factor (3,) linear; texture: index in the list of textures or -1.
+    """
+
+    V: np.ndarray
+    F: np.ndarray
+    ST: np.ndarray | None = None
+    colour: np.ndarray | None = None
+    factor: tuple = (1.0, 1.0, 1.0)
+    texture: int = -1
+    is_two_sided: bool = False
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Texture:
+    """A picture in linear light: rgb (h, w, 3) float32; wrap of s and of t: "clamp", "repeat" or "mirror"."""
+
+    rgb: np.ndarray
+    wrap: tuple = ("repeat", "repeat")
+
+
+@dataclass(frozen=True)
+class Model:
+    """Parts joined into one mesh, ready to be looked at."""
+
+    mesh: closest.Mesh
+    face_part: np.ndarray  # (n_f,)
+    ST: np.ndarray  # (n_v, 2)
+    colour: np.ndarray  # (n_v, 3), vertex colour times factor
+    parts: list = field(repr=False)
+
+    @property
+    def size(self):
+        return self.mesh.scale
+
+
+def join(parts):
+    """Model of a list of Part."""
+    starts = np.cumsum([0] + [len(p.V) for p in parts])
+    V = np.concatenate([np.asarray(p.V, float) for p in parts] + [np.zeros((0, 3))])
+    F = np.concatenate([np.asarray(p.F, int) + s for p, s in zip(parts, starts, strict=False)] + [np.zeros((0, 3), int)])
+    ST = np.concatenate([np.zeros((len(p.V), 2)) if p.ST is None else p.ST for p in parts] + [np.zeros((0, 2))])
+    colour = np.concatenate(
+        [np.broadcast_to((1.0 if p.colour is None else p.colour) * np.asarray(p.factor, float), (len(p.V), 3))
+         for p in parts] + [np.zeros((0, 3))])
+    face_part = np.repeat(np.arange(len(parts)), [len(p.F) for p in parts])
+    return Model(closest.prepare(V, F), face_part, ST, colour, list(parts))
+
+
+def first_visible(model, origin, direction):
+    """Like `closest.first_hits`, but a ray passes through the back of a one-sided part (back-face culling).
+
+    Returns t (n,) in lengths of `direction`, face (n,), weight (n, 3).
+    """
+    t, face, weight = closest.first_hits(model.mesh, origin, direction)
+    two_sided = np.array([p.is_two_sided for p in model.parts] + [True])
+    corners = model.mesh.V[model.mesh.F]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) if len(corners) else corners[:, 0]
+    step = STEP * model.size / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)
+    for _ in range(THROUGH):
+        hit = np.flatnonzero(face >= 0)
+        behind = np.einsum("nx,nx->n", normal[face[hit]], direction[hit]) > 0
+        again = hit[behind & ~two_sided[model.face_part[face[hit]]]]
+        if not len(again):
+            break
+        start = t[again] + step[again]
+        more, face[again], weight[again] = closest.first_hits(
+            model.mesh, origin[again] + start[:, None] * direction[again], direction[again])
+        t[again] = start + more
+    else:
+        t[again], face[again], weight[again] = np.inf, -1, 0.0
+    return t, face, weight
+
+
+def render(model, textures, camera, width, height, samples=2, background=BACKGROUND, edges=0.0):
+    """Draw a model.
+
+    Parameters
+    ----------
+    model : Model
+    textures : list of Texture
+    camera : lib.report.camera.Camera
+    samples : int
+        Rays a pixel are samples x samples.
+    background : (3,) sRGB in [0, 1], where no face is seen.
+    edges : float
+        Darkens the pixels in which two triangles meet by this share: 0 shows the picture, 0.5 the triangulation on it.
+
+    Returns
+    -------
+    (height, width, 3) uint8, sRGB.
+    """
+    w, h = width * samples, height * samples
+    back = srgb_to_linear(np.asarray(background, float))
+    image = np.empty((h, w, 3), np.float32)
+    seen = np.full((h, w), -1, np.int64)
+    rows = max(1, RAYS_AT_ONCE // w)
+    for top in range(0, h, rows):
+        below = min(h, top + rows)
+        origin, direction = camera.rays(w, h, top, below)
+        _, face, weight = first_visible(model, origin, direction)
+        colour = shade(model, textures, face, weight)
+        colour[face < 0] = back
+        image[top:below] = colour.reshape(below - top, w, 3)
+        seen[top:below] = face.reshape(below - top, w)
+    if edges:
+        image[_borders(seen)] *= 1 - edges
+    image = image.reshape(height, samples, width, samples, 3).mean((1, 3))
+    return np.rint(linear_to_srgb(image) * 255).astype(np.uint8)
+
+
+def shade(model, textures, face, weight):
+    """Linear colour (n, 3) of hits; black where face is -1."""
+    colour = np.zeros((len(face), 3))
+    hit = np.flatnonzero(face >= 0)
+    part = model.face_part[face[hit]]
+    corner = model.mesh.F[face[hit]]
+    colour[hit] = np.einsum("nk,nkc->nc", weight[hit], model.colour[corner])
+    st = np.einsum("nk,nkc->nc", weight[hit], model.ST[corner])
+    texture = np.array([p.texture for p in model.parts] + [-1])[part]
+    for k in np.unique(texture[texture >= 0]):
+        here = texture == k
+        colour[hit[here]] *= lookup(textures[k], st[here])
+    return colour
+
+
+def lookup(texture, st):
+    """Bilinear value (n, 3) at texture coordinates (n, 2): the sample at column i, row j sits at ((i+.5)/w, (j+.5)/h)."""
+    h, w = texture.rgb.shape[:2]
+    x, y = st[:, 0] * w - 0.5, st[:, 1] * h - 0.5
+    i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
+    a, b = (x - i)[:, None], (y - j)[:, None]
+    i0, i1 = (_wrap(k, w, texture.wrap[0]) for k in (i, i + 1))
+    j0, j1 = (_wrap(k, h, texture.wrap[1]) for k in (j, j + 1))
+    rgb = texture.rgb
+    return (1 - b) * ((1 - a) * rgb[j0, i0] + a * rgb[j0, i1]) + b * ((1 - a) * rgb[j1, i0] + a * rgb[j1, i1])
+
+
+def _wrap(k, n, how):
+    if how == "clamp":
+        return np.clip(k, 0, n - 1)
+    if how == "mirror":
+        k = k % (2 * n)
+        return np.minimum(k, 2 * n - 1 - k)
+    return k % n
+
+
+def _borders(seen):
+    """Pixels whose right or lower neighbour shows another triangle."""
+    border = np.zeros(seen.shape, bool)
+    border[:, :-1] |= seen[:, :-1] != seen[:, 1:]
+    border[:-1] |= seen[:-1] != seen[1:]
+    return border
