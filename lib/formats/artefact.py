@@ -32,7 +32,8 @@ def atomic(path):
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, name = tempfile.mkstemp(prefix=f".{path.name[:60]}.", suffix=".part", dir=path.parent)
-        with os.fdopen(handle, "wb") as file:
+        os.close(handle)
+        with open(name, "wb") as file:  # by name: a library that writes by itself needs file.name
             yield file
             file.flush()
             os.fsync(file.fileno())

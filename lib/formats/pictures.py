@@ -1,0 +1,287 @@
+"""Pictures in and out: textures of any common format, EXR maps, 8-bit PNG.  The one importer of OpenImageIO.
+
+Conventions: an array is (h, w, 3), row 0 = the top row of the picture as it is looked at.  Linear means linear light in
+Rec. 709 primaries.  An EXR map breaks the first rule on purpose: its row 0 is v = 0, as glTF's t runs downwards too.
+
+Rules for what a texture file may hold:
+- grey becomes three equal channels; palettes are expanded; 16 bit is read as 16 bit; an Exif orientation is applied;
+- alpha is ignored: the colours are taken as stored, not composited (one warning if any pixel is not opaque);
+- integer files are decoded by `colour_space` (srgb or linear); float files (EXR, HDR, ...) are linear whatever it says;
+- every value must be a reflectance, 0 <= rho <= 1.
+"""
+from __future__ import annotations
+
+import os
+import stat
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+import OpenImageIO as oiio
+
+from lib.formats.artefact import ArtefactError, atomic
+from lib.maps.colour import linear_to_srgb, srgb_to_linear
+from lib.refusal import Refusal
+
+COLOUR_SPACES = ("srgb", "linear")
+MAX_SIDE = 32768
+MAX_PIXELS = 1 << 26  # 8192 x 8192; 0.8 GB as float32 RGB
+INTEGERS = {"uint8": np.uint8, "uint16": np.uint16}
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a picture file says of itself, upright: width, height [pixels], channels, is_float, has_alpha."""
+
+    width: int
+    height: int
+    channels: int
+    is_float: bool
+    has_alpha: bool
+
+
+def read_header(path):
+    """Return the Header of a picture file without decoding pixels.
+
+    Raises Refusal naming the file: missing, unreadable, a directory, empty, no picture, cut off (PNG, JPEG), too large.
+    """
+    source, spec = _open(path)
+    source.close()
+    width, height = spec.width, spec.height
+    if _orientation(spec) >= 5:
+        width, height = height, width
+    return Header(width, height, spec.nchannels, _format(spec) not in INTEGERS, spec.alpha_channel >= 0)
+
+
+def read_linear(path, colour_space="srgb", warn=None):
+    """Read a texture as reflectance.
+
+    Parameters
+    ----------
+    path : picture file
+    colour_space : "srgb" or "linear", how integer files are encoded
+    warn : callable(text) or None; told about ignored alpha and about float files called sRGB
+
+    Returns
+    -------
+    (h, w, 3) float32, linear RGB in [0, 1], row 0 = top.
+
+    Raises Refusal as read_header does, and for damaged pixels or a texel that is negative, above 1 or NaN.
+    """
+    if colour_space not in COLOUR_SPACES:
+        raise Refusal(f"{path}: colour_space: {colour_space!r}, allowed are {' and '.join(COLOUR_SPACES)}")
+    source, spec = _open(path)
+    kind = _format(spec)
+    pixels = source.read_image(kind if kind in INTEGERS else "float")
+    fault = source.geterror()
+    source.close()
+    if pixels is None or fault or pixels.size != spec.width * spec.height * spec.nchannels:
+        raise Refusal(f"{path}: is cut off or damaged: {_first_line(fault) or 'pixels are missing'}")
+    pixels = pixels.reshape(spec.height, spec.width, spec.nchannels)
+
+    if spec.alpha_channel >= 0 and warn is not None:
+        opaque = np.iinfo(INTEGERS[kind]).max if kind in INTEGERS else 1
+        if np.any(pixels[..., spec.alpha_channel] != opaque):
+            warn(f"{path}: alpha is ignored, colours are taken as stored")
+    if kind not in INTEGERS and colour_space == "srgb" and warn is not None:
+        warn(f"{path}: holds floating point values, taken as linear")
+
+    colour = _upright(pixels[..., _colour_channels(spec)], _orientation(spec))
+    if kind in INTEGERS:
+        return np.ascontiguousarray(_decode(colour, colour_space))
+    _check_reflectance(path, colour)
+    return np.ascontiguousarray(colour, dtype=np.float32)
+
+
+def _decode(codes, colour_space):
+    """Decode integer codes to linear float32 by a table with one entry a code."""
+    top = np.iinfo(codes.dtype).max
+    table = np.arange(top + 1) / top
+    return (srgb_to_linear(table) if colour_space == "srgb" else table).astype(np.float32)[codes]
+
+
+def _check_reflectance(path, colour):
+    bad = ~((colour >= 0) & (colour <= 1))
+    if bad.any():
+        row, column, channel = (int(x) for x in np.argwhere(bad)[0])
+        found = float(colour[row, column, channel])
+        raise Refusal(f"{path}: pixel row {row}, column {column}: {found:g}, a reflectance must be 0 <= rho <= 1")
+
+
+def _open(path):
+    """Return (ImageInput, spec) of a file that passed every check a header allows."""
+    path = os.fspath(path)
+    try:
+        status = os.stat(path)
+        if stat.S_ISDIR(status.st_mode):
+            raise Refusal(f"{path}: is a folder, expected a picture file")
+        if not stat.S_ISREG(status.st_mode):
+            raise Refusal(f"{path}: is not a regular file, expected a picture file")
+        if status.st_size == 0:
+            raise Refusal(f"{path}: is empty, expected a picture file")
+        with open(path, "rb") as file:
+            _check_complete(path, file, status.st_size)
+    except FileNotFoundError:
+        raise Refusal(f"{path}: not found") from None
+    except (OSError, ValueError) as error:
+        raise Refusal(f"{path}: can not be read: {getattr(error, 'strerror', None) or error}") from None
+    wish = oiio.ImageSpec()
+    wish.attribute("oiio:UnassociatedAlpha", 1)  # colours as stored, not multiplied by alpha
+    source = oiio.ImageInput.open(path, wish)
+    if source is None:
+        raise Refusal(f"{path}: not a picture that can be read: {_first_line(oiio.geterror())}")
+    spec = source.spec()
+    if not (0 < spec.width <= MAX_SIDE and 0 < spec.height <= MAX_SIDE and spec.width * spec.height <= MAX_PIXELS):
+        source.close()
+        raise Refusal(f"{path}: {spec.width} x {spec.height} pixels, "
+                      f"allowed are up to {MAX_SIDE} a side and {MAX_PIXELS} in all")
+    if spec.depth > 1 or spec.nchannels < 1:
+        source.close()
+        raise Refusal(f"{path}: depth {spec.depth}, {spec.nchannels} channels, expected a flat picture")
+    return source, spec
+
+
+def _check_complete(path, file, size):
+    """Refuse a PNG or JPEG whose end is missing or whose header asks for too much, by its marks alone."""
+    head = file.read(24)
+    if head.startswith(b"\x89PNG\r\n\x1a\n"):
+        if len(head) == 24:
+            width, height = struct.unpack(">II", head[16:24])
+            if width > MAX_SIDE or height > MAX_SIDE or width * height > MAX_PIXELS:
+                raise Refusal(f"{path}: {width} x {height} pixels, "
+                              f"allowed are up to {MAX_SIDE} a side and {MAX_PIXELS} in all")
+        at = 8
+        while at + 12 <= size:
+            file.seek(at)
+            length, name = struct.unpack(">I4s", file.read(8))
+            at += 12 + length
+            if name == b"IEND" and at <= size:
+                return
+        raise Refusal(f"{path}: is cut off: the PNG has no end")
+    if head.startswith(b"\xff\xd8\xff"):
+        file.seek(0)
+        data = file.read()
+        at = 2
+        while at + 4 <= size and data[at] == 0xFF and data[at + 1] != 0xDA:  # walk the segments before the scan
+            at += 2 + struct.unpack(">H", data[at + 2:at + 4])[0] if data[at + 1] != 0xFF else 1
+        if data.rfind(b"\xff\xd9") < at:
+            raise Refusal(f"{path}: is cut off: the JPEG has no end")
+
+
+def _format(spec):
+    """Name of the pixel type to decode to: uint8, uint16, or anything else for float."""
+    return str(spec.format)
+
+
+def _colour_channels(spec):
+    """Indices of the channels read as R, G, B: by name, else the first three, else the first thrice (grey)."""
+    names = [name.upper() for name in spec.channelnames]
+    if all(name in names for name in "RGB"):
+        return [names.index(name) for name in "RGB"]
+    colours = [k for k in range(spec.nchannels) if k != spec.alpha_channel] or [0]
+    return colours[:3] if len(colours) >= 3 else [colours[0]] * 3
+
+
+def _orientation(spec):
+    return spec.get_int_attribute("Orientation", 1)
+
+
+def _upright(pixels, orientation):
+    """Turn a picture as stored to the way it is looked at (Exif orientation 1 to 8)."""
+    if orientation >= 5:
+        pixels = pixels.transpose(1, 0, 2)
+    flip_rows, flip_columns = {2: (0, 1), 3: (1, 1), 4: (1, 0), 6: (0, 1), 7: (1, 1), 8: (1, 0)}.get(orientation, (0, 0))
+    return pixels[::-1 if flip_rows else 1, ::-1 if flip_columns else 1]
+
+
+def _first_line(text):
+    return (text or "").strip().split("\n")[0].rstrip(".")
+
+
+# Radical inverse of the plane's golden section [Roberts 2018]: its fractional parts spread evenly, like blue noise.
+R2 = (0.7548776662466927, 0.5698402909980532)
+
+
+def dither(h, w):
+    """Return thresholds (h, w, 3) float32 in (0, 1): a fixed pattern without clumps, shifted by channel."""
+    row, column = np.arange(h)[:, None, None], np.arange(w)[None, :, None]
+    return ((0.5 + column * R2[0] + row * R2[1] + np.arange(3) / 3) % 1).astype(np.float32) * 0.998 + np.float32(0.001)
+
+
+def quantise_srgb(linear):
+    """Return 8-bit sRGB codes (h, w, 3) of linear RGB, clipped to [0, 1], dithered without a clock or random numbers.
+
+    A value that is a code exactly keeps it; the mean of an even area is kept to about 1/100 of a code.
+    """
+    h, w, _ = np.shape(linear)
+    scaled = 255 * linear_to_srgb(np.asarray(linear, np.float32))
+    return np.minimum(scaled + dither(h, w), 255).astype(np.uint8)
+
+
+def write_png_srgb(path, linear):
+    """Write linear RGB (h, w, 3), row 0 = top, as a dithered 8-bit sRGB PNG. Raises ValueError for NaN, ArtefactError."""
+    linear = np.asarray(linear)
+    if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
+        raise ValueError(f"linear: expected finite (h, w, 3), found {linear.shape}")
+    write_png8(path, quantise_srgb(linear))
+
+
+def write_png8(path, codes):
+    """Write uint8 codes (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) as a PNG, row 0 = top. Raises ArtefactError."""
+    codes = np.asarray(codes)
+    if codes.dtype != np.uint8:
+        raise ValueError(f"codes: expected uint8, found {codes.dtype}")
+    _write(path, "png", codes.reshape(*codes.shape[:2], -1), "uint8", {"oiio:UnassociatedAlpha": 1})
+
+
+def write_exr(path, linear, metadata=None):
+    """Write a map (h, w, 3) float32 as lossless 32-bit EXR, row 0 = v 0 = first line of the file.
+
+    metadata: {name: str, number, or sequence of numbers}. The bytes depend on the arguments alone: no time stamp.
+    Raises ValueError for NaN or Inf (never in a map), ArtefactError when the file can not be written.
+    """
+    linear = np.asarray(linear, np.float32)
+    if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
+        raise ValueError(f"{path}: expected finite (h, w, 3), found {linear.shape}")
+    _write(path, "exr", linear, "float", {"compression": "zip", "DateTime": "", **(metadata or {})})
+
+
+def _write(path, extension, pixels, kind, attributes):
+    h, w, channels = pixels.shape
+    spec = oiio.ImageSpec(w, h, channels, kind)
+    for name, value in attributes.items():
+        if isinstance(value, str | int | float):
+            spec.attribute(name, value)
+        else:
+            numbers = tuple(float(x) for x in value)
+            spec.attribute(name, f"float[{len(numbers)}]", numbers)
+    with atomic(path) as file:
+        out = oiio.ImageOutput.create(f"x.{extension}")
+        done = out.open(file.name, spec) and out.write_image(np.ascontiguousarray(pixels))
+        done = out.close() and done
+        if not done:
+            raise ArtefactError(f"{path}: can not be written: {_first_line(out.geterror()) or 'disk full?'}")
+
+
+def read_exr(path):
+    """Read an EXR map: ((h, w, 3) float32 as stored, dict of its metadata). Raises Refusal as read_header does."""
+    source, spec = _open(path)
+    pixels = source.read_image("float")
+    fault = source.geterror()
+    source.close()
+    if pixels is None or fault:
+        raise Refusal(f"{path}: is cut off or damaged: {_first_line(fault)}")
+    pixels = pixels.reshape(spec.height, spec.width, spec.nchannels)
+    metadata = {p.name: p.value for p in spec.extra_attribs}
+    return np.ascontiguousarray(pixels[..., _colour_channels(spec)], np.float32), metadata
+
+
+def read_png8(path):
+    """Read a picture's 8-bit codes as stored: (h, w, channels) uint8. Raises Refusal as read_header does."""
+    source, spec = _open(path)
+    pixels = source.read_image("uint8")
+    fault = source.geterror()
+    source.close()
+    if pixels is None or fault:
+        raise Refusal(f"{path}: is cut off or damaged: {_first_line(fault)}")
+    return pixels.reshape(spec.height, spec.width, spec.nchannels)
