@@ -18,7 +18,7 @@ import numpy as np
 
 from lib.formats import pictures
 from lib.formats.artefact import ArtefactError
-from lib.maps.colour import srgb_to_linear
+from lib.refusal import Refusal
 from lib.report.picture import Part, Texture
 
 COMPONENT = {5120: np.int8, 5121: np.uint8, 5122: np.int16, 5123: np.uint16, 5125: np.uint32, 5126: np.float32}
@@ -38,6 +38,8 @@ def load(path):
             _walk(document, buffers, node, np.eye(4), parts)
     except FileNotFoundError as error:
         raise ArtefactError(f"{error.filename or path}: missing") from error
+    except Refusal as error:  # an exported texture is a file of ours
+        raise ArtefactError(str(error)) from error
     except (OSError, ValueError, KeyError, IndexError, TypeError, struct.error) as error:
         raise ArtefactError(f"{path}: not readable as glTF ({type(error).__name__}: {error})") from error
     return parts, textures
@@ -147,14 +149,14 @@ def _texture(document, buffers, path, texture):
     sampler = document["samplers"][texture["sampler"]] if "sampler" in texture else {}
     wrap = tuple(WRAP[sampler.get(key, 10497)] for key in ("wrapS", "wrapT"))
     if "uri" in image and not image["uri"].startswith("data:"):
-        rgb = pictures.load_stored(path.parent / unquote(image["uri"]))
+        rgb = pictures.read_linear(path.parent / unquote(image["uri"]))
     else:
         data = _bytes(path, image["uri"]) if "uri" in image else _view(document, buffers, image["bufferView"])[0]
         handle, name = tempfile.mkstemp(suffix=".jpg" if data[:2] == b"\xff\xd8" else ".png")
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(data)
-            rgb = pictures.load_stored(name)
+            rgb = pictures.read_linear(name)
         finally:
             os.unlink(name)
-    return Texture(srgb_to_linear(rgb).astype(np.float32), wrap)
+    return Texture(rgb, wrap)
