@@ -1,0 +1,131 @@
+"""The uniform lattice of samples on a surface's (u, v): crossings of lines, borders included.
+
+A surface has roots n_u x n_v; level l has n_u 2^l + 1 by n_v 2^l + 1 crossings.  Arrays are indexed [j, i], row j is v = j / (h - 1).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lib.nurbs.evaluate import evaluate, frame, frame_grid
+
+MOST_ROOTS = 8
+INSIDE = 0.002  # border samples are evaluated this far inside: on an edge shared by walls half the hemisphere is wall
+OFFSET = 7e-5  # in units of the scene's largest side: beyond float32 rounding of a ray's origin
+POLE_DIRECTIONS = (np.arange(8) + 0.5) / 8
+
+
+def roots_of(extent):
+    """Root cells (n_u, n_v): 1 along the shorter side, the rounded aspect ratio, at most 8, along the longer.
+
+    >>> roots_of((6.0, 2.9)), roots_of((1.0, 100.0)), roots_of((0.0, 1.0))
+    ((2, 1), (1, 8), (1, 8))
+    """
+    u, v = extent
+    if u >= v:
+        return (int(min(MOST_ROOTS, max(1, round(u / v)))) if v > 0 else MOST_ROOTS), 1
+    return 1, (int(min(MOST_ROOTS, max(1, round(v / u)))) if u > 0 else MOST_ROOTS)
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Topology of one surface's lattice: roots (n_u, n_v), closed (u, v), collapsed sides (u=0, u=1, v=0, v=1)."""
+
+    roots: tuple
+    closed: tuple = (False, False)
+    collapsed: tuple = (False, False, False, False)
+
+    def shape(self, level):
+        """(h, w) of the lattice at a level."""
+        return self.roots[1] * 2**level + 1, self.roots[0] * 2**level + 1
+
+    def cells(self, level):
+        """(rows, columns) of cells at a level."""
+        return self.roots[1] * 2**level, self.roots[0] * 2**level
+
+    def is_own(self, level):
+        """(h, w) bool: crossings that are samples of their own, not copies across a seam or along a collapsed side."""
+        own = np.ones(self.shape(level), dtype=bool)
+        if self.closed[0]:
+            own[:, -1] = False
+        if self.closed[1]:
+            own[-1] = False
+        for side, line in zip(self.collapsed, (own[:, 0], own[:, -1], own[0], own[-1]), strict=True):
+            if side:
+                first = line[0] or line[-1]
+                line[:] = False
+                line[0] = first
+        return own
+
+    def copy_own(self, array):
+        """Copy samples to the crossings that repeat them, in place: seams first, then collapsed sides.  array (h, w, ...)."""
+        if self.closed[0]:
+            array[:, -1] = array[:, 0]
+        if self.closed[1]:
+            array[-1] = array[0]
+        for side, line in zip(self.collapsed, (array[:, 0], array[:, -1], array[0], array[-1]), strict=True):
+            if side:
+                line[:] = line[:1].copy()
+
+
+def receivers(surface, flip, lift, lattice, level, j, i):
+    """Ray origins and normals of lattice crossings.
+
+    j, i (m,) crossings of `level`.  lift: distance between the surface and its mesh, OFFSET is added.
+    Returns x (m, 3) float64 lifted off along N, N (m, 3) float64 unit, on the side that receives.
+    """
+    h, w = lattice.shape(level)
+    j, i = np.asarray(j), np.asarray(i)
+    u, v, pole = _parameters(lattice, j, i, h, w)
+    if len(j) * 4 >= h * w and not any(lattice.collapsed):
+        # Most of the lattice: evaluate it as a tensor grid.
+        S, N = _grid(surface, lattice, h, w)
+        S, N = S[j, i], N[j, i]
+    else:
+        S, N = frame(surface, u, v)
+    for k in np.flatnonzero(pole):
+        N[k] = _pole_normal(surface, lattice, u[k], v[k])
+    N = -N if flip else N
+    return S + N * (lift + OFFSET), N
+
+
+def _grid(surface, lattice, h, w):
+    middle_j, middle_i = np.full(w, h // 2), np.full(h, w // 2)
+    u = _parameters(lattice, middle_j, np.arange(w), h, w)[0]
+    v = _parameters(lattice, np.arange(h), middle_i, h, w)[1]
+    return frame_grid(surface, u, v)
+
+
+def _parameters(lattice, j, i, h, w):
+    """u, v of crossings, a little inside open borders, and which of them are poles of closed surfaces."""
+    u, v = i / (w - 1), j / (h - 1)
+    on = (i == 0, i == w - 1, j == 0, j == h - 1)
+    collapsed = [on[k] & lattice.collapsed[k] for k in range(4)]
+    pole = np.zeros(np.shape(u), dtype=bool)
+    if lattice.closed[1]:
+        pole |= collapsed[0] | collapsed[1]
+    if lattice.closed[0]:
+        pole |= collapsed[2] | collapsed[3]
+    # A collapsed side of an open surface (a triangle's corner) is seen from the middle of the side.
+    u = np.where((collapsed[2] | collapsed[3]) & ~pole, 0.5, u)
+    v = np.where((collapsed[0] | collapsed[1]) & ~pole, 0.5, v)
+    if not lattice.closed[0]:
+        u = np.where(pole, u, np.clip(u, INSIDE, 1 - INSIDE))
+    if not lattice.closed[1]:
+        v = np.where(pole, v, np.clip(v, INSIDE, 1 - INSIDE))
+    return u, v, pole
+
+
+def _pole_normal(surface, lattice, u, v):
+    """Mean of the limits around the pole: the axis of a cone, the normal of a smooth cap."""
+    around_u = POLE_DIRECTIONS if lattice.closed[0] else np.full(8, u)
+    around_v = POLE_DIRECTIONS if lattice.closed[1] else np.full(8, v)
+    N = frame(surface, around_u, around_v)[1].sum(axis=0)
+    length = np.linalg.norm(N)
+    return N / length if length > 1e-6 else frame(surface, np.array([u]), np.array([v]))[1][0]
+
+
+def area_density(surface, u, v):
+    """|S_u x S_v| at parameters u, v (m,): (m,)."""
+    _, S_u, S_v = evaluate(surface, u, v)
+    return np.linalg.norm(np.cross(S_u, S_v), axis=1)

@@ -1,0 +1,139 @@
+"""An adaptive quadtree of samples over one surface's lattice: where to sample next, and when to stop.
+
+Predicate (midpoint rule): a leaf is divided if one of the five midpoints measured in its PARENT departs from the parent's bilinear
+prediction by more than tau.  At the base level, where no parent was measured, it is the contrast of the four corners.
+Hidden samples take no part.  The tree is kept balanced, and corners that balancing adds are measured like any other.
+"""
+
+import numpy as np
+
+from lib.elements.balance import balance, children
+
+
+class Quadtree:
+    """State of one tree.
+
+    lattice : Lattice; level : of the arrays below, which hold the whole lattice of that level
+    value (h, w, C) float32, known, hidden (h, w) bool, noise (h, w) float32 standard error of the sample
+    divided : list of (n_v 2^l, n_u 2^l) bool for l < level
+    """
+
+    def __init__(self, lattice, base, channels):
+        self.lattice, self.base, self.level = lattice, base, base
+        shape = lattice.shape(base)
+        self.value = np.zeros((*shape, channels), dtype=np.float32)
+        self.noise = np.zeros(shape, dtype=np.float32)
+        self.known = np.zeros(shape, dtype=bool)
+        self.hidden = np.zeros(shape, dtype=bool)
+        self.divided = [np.ones(lattice.cells(level), dtype=bool) for level in range(base)]
+        self._wanted = lattice.is_own(base)
+
+    def wanted(self):
+        """Crossings j, i (m,) of the current level that must be measured next."""
+        return np.nonzero(self._wanted)
+
+    def put(self, value, hidden, noise):
+        """Store the samples of wanted(), in its order: value (m, C), hidden (m,), noise (m,)."""
+        self.value[self._wanted], self.hidden[self._wanted], self.noise[self._wanted] = value, hidden, noise
+        self.known |= self._wanted
+        self._wanted = np.zeros_like(self.known)
+        for array in (self.value, self.hidden, self.noise, self.known):
+            self.lattice.copy_own(array)
+
+    def split(self, tau, top):
+        """Divide leaves above the threshold tau, up to level `top`; balance.  Returns True when new samples are wanted."""
+        divided = [*self.divided, *(np.zeros(self.lattice.cells(self.level), dtype=bool) for _ in range(self.level < top))]
+        for level in range(self.base, len(divided)):
+            divided[level] |= self._exceeds(level, tau) & self._exists(level)
+        divided = balance(divided, self.lattice.closed)
+        if not any((new & ~old).any() for new, old in zip(divided, self._padded(divided), strict=True)):
+            return False
+        fresh = [new & ~old for new, old in zip(divided, self._padded(divided), strict=True)]
+        if len(divided) > len(self.divided):
+            if divided[-1].any():
+                self._deepen()
+            else:
+                divided, fresh = divided[:-1], fresh[:-1]
+        self.divided = divided
+        self._want(fresh)
+        return bool(self._wanted.any())
+
+    def _padded(self, divided):
+        return [*self.divided, *(np.zeros_like(d) for d in divided[len(self.divided) :])]
+
+    def _exists(self, level):
+        return children(self.divided[level - 1]) if level else np.ones(self.lattice.cells(0), dtype=bool)
+
+    def _exceeds(self, level, tau):
+        if level == self.base:
+            return self.contrast(level) > tau
+        return children(self.residual(level - 1) > tau)
+
+    def contrast(self, level):
+        """Largest difference between visible corners of each cell of a level, over channels: (rows, columns)."""
+        step = 2 ** (self.level - level)
+        value, hidden = self.value[::step, ::step], self.hidden[::step, ::step]
+        low = np.where(hidden[..., None], np.inf, value)
+        high = np.where(hidden[..., None], -np.inf, value)
+        corners = [(slice(None, -1), slice(None, -1)), (slice(None, -1), slice(1, None))]
+        corners += [(slice(1, None), slice(None, -1)), (slice(1, None), slice(1, None))]
+        spread = np.maximum.reduce([high[c] for c in corners]) - np.minimum.reduce([low[c] for c in corners])
+        return np.where(np.isfinite(spread), spread, 0.0).max(axis=2)
+
+    def residual(self, level):
+        """Largest departure of the five midpoints from bilinear prediction, for each divided cell of a level: (rows, columns)."""
+        step = 2 ** (self.level - level - 1)
+        value, hidden = self.value[::step, ::step], self.hidden[::step, ::step]
+        row = _departure(value[::2, ::2], hidden[::2, ::2], value[::2, 1::2], hidden[::2, 1::2], axis=1)
+        column = _departure(value[::2, ::2], hidden[::2, ::2], value[1::2, ::2], hidden[1::2, ::2], axis=0)
+        ends, ends_hidden = value[::2, ::2], hidden[::2, ::2]
+        across = (ends[:, :-1] + ends[:, 1:]) / 2
+        across_hidden = ends_hidden[:, :-1] | ends_hidden[:, 1:]
+        centre = _departure(across, across_hidden, value[1::2, 1::2], hidden[1::2, 1::2], axis=0)
+        worst = np.maximum.reduce([row[:-1], row[1:], column[:, :-1], column[:, 1:], centre])
+        return np.where(self.divided[level], worst, 0.0)
+
+    def _deepen(self):
+        self.level += 1
+        shape = self.lattice.shape(self.level)
+        for name in ("value", "noise", "known", "hidden"):
+            old = getattr(self, name)
+            new = np.zeros((*shape, *old.shape[2:]), dtype=old.dtype)
+            new[::2, ::2] = old
+            setattr(self, name, new)
+
+    def _want(self, fresh):
+        required = np.zeros_like(self.known)
+        for level, cells in enumerate(fresh):
+            step = 2 ** (self.level - level - 1)
+            j, i = np.nonzero(cells)
+            for dj in range(3):
+                for di in range(3):
+                    required[(2 * j + dj) * step, (2 * i + di) * step] = True
+        self._wanted = required & ~self.known
+        # A copy across the seam asks for the sample it repeats.
+        if self.lattice.closed[0]:
+            self._wanted[:, 0] |= self._wanted[:, -1]
+        if self.lattice.closed[1]:
+            self._wanted[0] |= self._wanted[-1]
+        self._wanted &= self.lattice.is_own(self.level) & ~self.known
+
+    def leaves(self):
+        """Leaves as rows (level, j, i), coarse to fine: (m, 3) int32."""
+        rows = []
+        for level in range(self.level + 1):
+            own = self._exists(level)
+            if level < len(self.divided):
+                own = own & ~self.divided[level]
+            j, i = np.nonzero(own)
+            rows.append(np.stack([np.full(j.size, level), j, i], axis=1))
+        return np.concatenate(rows).astype(np.int32)
+
+
+def _departure(ends, ends_hidden, middle, middle_hidden, axis):
+    """|middle - mean of its two ends|, largest over channels; 0 where one of the three is hidden."""
+    n = ends.shape[axis]
+    first, last = np.arange(n - 1), np.arange(1, n)
+    predicted = (np.take(ends, first, axis=axis) + np.take(ends, last, axis=axis)) / 2
+    skip = np.take(ends_hidden, first, axis=axis) | np.take(ends_hidden, last, axis=axis) | middle_hidden
+    return np.where(skip, 0.0, np.abs(middle - predicted).max(axis=-1))

@@ -1,0 +1,59 @@
+"""Rays against the triangles of the shadow casters.  The one importer of embreex.
+
+Measured on 103 k triangles, one core: embreex 3.0 M closest hits and 6 M occlusions a second, open3d's RaycastingScene the same to
+10 %, both on Embree; but open3d takes 1.0 CPU s to start and embreex 0.05 s, and a bake has several ray jobs.
+Robust mode: no ray slips through an edge or vertex.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+
+REACH = np.float32(0.9995)  # a shadow ray to a point stops short of the surface that holds the point
+
+
+@dataclass(frozen=True)
+class Hits:
+    """Closest hits of n rays: face (n,) int32, -1 where nothing; a, b (n,) float32 barycentric weights of the face's second and
+    third vertex; is_back (n,) bool, the ray arrives from behind the face."""
+
+    face: np.ndarray
+    a: np.ndarray
+    b: np.ndarray
+    is_back: np.ndarray
+
+
+class Tracer:
+    """A scene of triangles V (n, 3), F (m, 3) ready for rays; both in the scene's frame, so that float32 is enough."""
+
+    def __init__(self, V, F):
+        self._V = np.ascontiguousarray(V, dtype=np.float32)  # kept: the scene reads them while it lives
+        self._F = np.ascontiguousarray(F, dtype=np.int32)
+        self._scene = None
+        if len(self._F):
+            self._scene = EmbreeScene(robust=True)
+            TriangleMesh(self._scene, self._V, self._F)
+        self.rays = 0
+
+    def closest(self, origins, directions, reach=None):
+        """First face each ray meets (within t < reach, if given): Hits.  origins, directions (n, 3) float32."""
+        n = len(origins)
+        self.rays += n
+        if self._scene is None or not n:
+            none = np.zeros(n, dtype=np.float32)
+            return Hits(np.full(n, -1, dtype=np.int32), none, none, np.zeros(n, dtype=bool))
+        tfar = None if reach is None else np.full(n, reach, dtype=np.float32)
+        hit = self._scene.run(origins, directions, tfar, output=1)
+        Ng = hit["Ng"]
+        towards = Ng[:, 0] * directions[:, 0] + Ng[:, 1] * directions[:, 1] + Ng[:, 2] * directions[:, 2]
+        return Hits(hit["primID"], hit["u"], hit["v"], towards > 0)
+
+    def is_blocked(self, origins, D):
+        """(n,) bool: something stands between each origin and the point origin + D, the last 1/2000 left out."""
+        n = len(origins)
+        self.rays += n
+        if self._scene is None or not n:
+            return np.zeros(n, dtype=bool)
+        return self._scene.run(origins, D, np.full(n, REACH, dtype=np.float32), query="OCCLUDED") >= 0
