@@ -1,0 +1,140 @@
+"""Sum the light groups, B = rho_avg H, and multiply the light of textured surfaces by their base texture over rho_avg.
+
+reads   scene.npz, light maps of one chunk, materials and textures JSON    (lib.formats.scene, .light_maps; pictures)
+        materials: {"rho_avg": {surface: [r, g, b]}}
+        textures:  {"textures": {surface: {"file": path, "colour_space": "srgb", "repeat": [n, m]}}}
+        settings:  {"texture_level": 10, "intensity": {group: factor or [r, g, b]}}
+writes  textured maps of the chunk                                         (lib.formats.textured_maps)
+        MAPS_FOLDER/<surface>.exr for each surface: B without base texture, full size
+"""
+import hashlib
+import json
+from pathlib import Path
+
+import numpy as np
+
+from lib import door
+from lib.formats import light_maps, pictures, scene, textured_maps
+from lib.formats.artefact import read_json
+from lib.maps import base_texture
+from lib.maps.fill import one_deep
+from lib.maps.mapset import pack, side_lengths
+from lib.nurbs.shape import collapsed_sides, is_closed
+from lib.refusal import Refusal
+
+
+def arguments(parser):
+    parser.add_argument("--scene", required=True, metavar="FILE", help="scene.npz")
+    parser.add_argument("--maps", required=True, metavar="FILE", help="light maps of the chunk")
+    parser.add_argument("--materials", required=True, metavar="FILE", help="JSON: rho_avg of every surface")
+    parser.add_argument("--textures", required=True, metavar="FILE", help="JSON: base textures")
+    parser.add_argument("--settings", type=json.loads, default={}, metavar="JSON", help="texture_level, intensity")
+    parser.add_argument("--maps-folder", required=True, metavar="FOLDER", help="where the EXR maps go")
+    parser.add_argument("--out", required=True, metavar="FILE", help="textured maps of the chunk")
+
+
+def body(args, cost):
+    x = scene.load(args.scene)
+    chunk = light_maps.load(args.maps)
+    rho_avg = read_json(args.materials)["rho_avg"]
+    textures = read_json(args.textures)["textures"]
+    texture_level = checked_level(args.settings.get("texture_level", 10))
+    weights = group_weights(x.groups, args.settings.get("intensity", {}), chunk.maps.value.shape[1])
+
+    loaded, used = {}, {}
+    light, light_hidden, final, final_hidden, final_level = [], [], [], [], []
+    for k, s in enumerate(chunk.maps.surface):
+        name, surface, hidden = x.names[s], x.surfaces[s], chunk.maps.hidden_map(k)
+        H = np.einsum("jigc,gc->jic", chunk.maps.map(k).astype(np.float64), weights)
+        B = np.where(hidden[..., None], np.float32(0), base_texture.reflected(H, rho_avg[name]))
+        light.append(B)
+        light_hidden.append(hidden)
+        write_map(Path(args.maps_folder) / f"{x.files[s]}.exr", B, hidden, name, surface, rho_avg[name])
+        if name in textures:
+            picture = load_picture(textures[name], name, loaded, used)
+            level, B, hidden = textured(B, hidden, chunk.maps.roots[k], chunk.maps.level[k], surface, picture,
+                                        textures[name]["repeat"], rho_avg[name], texture_level)
+        else:
+            level = int(chunk.maps.level[k])
+        final.append(B)
+        final_hidden.append(hidden)
+        final_level.append(level)
+
+    maps, names = chunk.maps, [x.names[s] for s in chunk.maps.surface]
+    cost.notes["textured_surfaces"] = sum(name in textures for name in names)
+    textured_maps.save(args.out, textured_maps.TexturedMaps(
+        names=names,
+        light=pack(maps.surface, maps.roots, maps.level, light, light_hidden),
+        final=pack(maps.surface, maps.roots, final_level, final, final_hidden),
+        E=np.asarray(x.E, np.float64)[maps.surface],
+        rho_avg=np.array([rho_avg[name] for name in names], np.float64).reshape(-1, 3),
+        textured=np.array([name in textures for name in names], bool),
+        pictures=used,
+        stats=chunk.stats,
+    ))
+
+
+def checked_level(level):
+    if isinstance(level, bool) or not isinstance(level, int) or not 0 <= level <= 14:
+        raise Refusal(f"texture_level: {level!r}, allowed are whole numbers from 0 to 14")
+    return level
+
+
+def group_weights(groups, intensity, n_groups):
+    """Return (G, 3) factors of the light groups: 1 unless `intensity` names the group."""
+    if len(groups) != n_groups:
+        raise ValueError(f"light maps hold {n_groups} groups, the scene {len(groups)}: {groups}")
+    weights = np.ones((n_groups, 3))
+    for name, factor in intensity.items():
+        if name not in groups:
+            raise Refusal(f"intensity: {name}: no such light group, the scene has {', '.join(groups)}")
+        try:
+            weights[list(groups).index(name)] = factor
+        except (TypeError, ValueError):
+            raise Refusal(f"intensity: {name}: {factor!r}, expected a number or three >= 0") from None
+    if not (np.isfinite(weights) & (weights >= 0)).all():
+        raise Refusal(f"intensity: {intensity}, expected finite numbers >= 0")
+    return weights
+
+
+def load_picture(texture, name, loaded, used):
+    """Return the picture of a texture entry, read once; notes its size under the hash of its bytes."""
+    key = texture["file"], texture["colour_space"]
+    if key not in loaded:
+        try:
+            loaded[key] = pictures.read_linear(*key)
+            digest = hashlib.sha256(Path(texture["file"]).read_bytes()).hexdigest()
+        except Refusal as error:
+            raise Refusal(f"surface {name}: texture: {error}") from None
+        used[digest] = [loaded[key].shape[1], loaded[key].shape[0]]
+    return loaded[key]
+
+
+def textured(B, hidden, roots, level, surface, picture, repeat, rho_avg, texture_level):
+    """Return (level, B_final, hidden) on the grid that holds both the light and the picture."""
+    common = base_texture.common_level(roots, level, picture.shape[1::-1], repeat, texture_level)
+    B, hidden = base_texture.upsample(B, hidden, common - level)
+    w, h = side_lengths(roots, common)
+    rho = base_texture.evaluate_picture(picture, repeat, w, h, base_texture.wraps(surface, repeat),
+                                        collapsed_sides(surface))
+    return common, base_texture.apply(B, rho, rho_avg), hidden
+
+
+def write_map(path, B, hidden, name, surface, rho_avg):
+    """Write the illumination map of one surface."""
+    pictures.write_exr(path, one_deep(B, hidden, is_closed(surface)), {
+        "surface": name,
+        "unit": "W/m^2",
+        "quantity": "reflected radiosity B without base texture",
+        "convention": "texel (i, j) is the sample at u = i/(W-1), v = j/(H-1); first row is v = 0",
+        "uv_domain": (0, 1, 0, 1),
+        "rho_avg": tuple(rho_avg),
+    })
+
+
+def main(argv=None):
+    return door.run(__doc__, arguments, body, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

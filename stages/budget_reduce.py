@@ -1,0 +1,80 @@
+"""Shrink the exported textures until their GPU bytes S fit the budget T, giving up the least detail.
+
+reads   textured maps of every chunk, casters.npz (closed directions)     (lib.formats.textured_maps, .casters)
+        settings: {"budget": bytes, "profile": "standard" or "lightmap"}
+writes  textures.npz, all surfaces                                         (lib.formats.textured_maps)
+        budget.json: S before and after, who gave up what
+
+`standard` exports light on its base texture and reduces those maps; `lightmap` exports and reduces the light alone, and the base
+textures count as fixed bytes.
+"""
+import dataclasses
+import json
+
+from lib import door
+from lib.formats import casters, textured_maps
+from lib.formats.artefact import write_json
+from lib.maps import budget
+from lib.refusal import Refusal
+
+PROFILES = {"standard": "final", "lightmap": "light"}
+
+
+def arguments(parser):
+    parser.add_argument("--maps", required=True, nargs="+", metavar="FILE", help="textured maps of every chunk")
+    parser.add_argument("--casters", required=True, metavar="FILE", help="casters.npz")
+    parser.add_argument("--settings", required=True, type=json.loads, metavar="JSON", help="budget [bytes], profile")
+    parser.add_argument("--out", required=True, metavar="FILE", help="textures.npz")
+    parser.add_argument("--table", required=True, metavar="FILE", help="budget.json")
+
+
+def body(args, cost):
+    x = textured_maps.merge([textured_maps.load(path) for path in args.maps])
+    is_closed = casters.load(args.casters).is_closed
+    profile = args.settings.get("profile", "standard")
+    if profile not in PROFILES:
+        raise Refusal(f"profile: {profile!r}, allowed are {' and '.join(PROFILES)}")
+    T = args.settings.get("budget")
+    before = getattr(x, PROFILES[profile])
+    fixed = 0 if profile == "standard" else sum(budget.gpu_bytes(w, h) for w, h in x.pictures.values())
+
+    after, steps, D = budget.reduce(before, is_closed[before.surface], T, fixed)
+
+    textured_maps.save(args.out, dataclasses.replace(x, **{PROFILES[profile]: after}))
+    write_json(args.table, table(x.names, profile, T, fixed, before, after, steps, D))
+    cost.notes["levels_removed"] = len(steps)
+
+
+def table(names, profile, T, fixed, before, after, steps, D):
+    """Return the JSON record: totals, one row a surface, one row a removal in order; all bytes are GPU bytes with mips."""
+    name_of = dict(zip(before.surface.tolist(), names, strict=True))
+    (w0, h0), (w1, h1) = before.sizes(), after.sizes()
+    surfaces = [{
+        "surface": names[k],
+        "level_before": int(before.level[k]),
+        "level_after": int(after.level[k]),
+        "size_before": [int(w0[k]), int(h0[k])],
+        "size_after": [int(w1[k]), int(h1[k])],
+        "bytes_before": budget.gpu_bytes(int(w0[k]), int(h0[k])),
+        "bytes_after": budget.gpu_bytes(int(w1[k]), int(h1[k])),
+        "D": float(D[k]),
+        "D_given_up": sum((step.D for step in steps if step.surface == before.surface[k]), 0.0),
+    } for k in range(len(names))]
+    return {
+        "profile": profile,
+        "T": int(T),
+        "S_before": budget.total(before, fixed),
+        "S_after": budget.total(after, fixed),
+        "S_smallest": budget.smallest_total(before.roots, fixed),
+        "fixed": fixed,
+        "surfaces": surfaces,
+        "steps": [{"surface": name_of[s.surface], "level": s.level, "D": s.D, "S": s.S} for s in steps],
+    }
+
+
+def main(argv=None):
+    return door.run(__doc__, arguments, body, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
