@@ -5,8 +5,8 @@ reads   textured maps of every chunk, casters.npz (closed directions)     (lib.f
 writes  textures.npz, all surfaces                                         (lib.formats.textured_maps)
         budget.json: S before and after, who gave up what
 
-`standard` exports light on its base texture and reduces those maps; `lightmap` exports and reduces the light alone, and the base
-textures count as fixed bytes.
+`standard` exports light on its base texture and reduces those maps; `lightmap` exports and reduces the light alone,
+and the base textures count as fixed bytes.
 """
 import dataclasses
 import json
@@ -46,7 +46,7 @@ def body(args, cost):
 
 
 def table(names, profile, T, fixed, before, after, steps, D):
-    """Return the JSON record: totals, one row a surface, one row a removal in order; all bytes are GPU bytes with mips."""
+    """Return the JSON record: totals, one row a surface, one row a removal in order; bytes are GPU bytes."""
     name_of = dict(zip(before.surface.tolist(), names, strict=True))
     (w0, h0), (w1, h1) = before.sizes(), after.sizes()
     surfaces = [{

@@ -190,7 +190,8 @@ def _upright(pixels, orientation):
     """Turn a picture as stored to the way it is looked at (Exif orientation 1 to 8)."""
     if orientation >= 5:
         pixels = pixels.transpose(1, 0, 2)
-    flip_rows, flip_columns = {2: (0, 1), 3: (1, 1), 4: (1, 0), 6: (0, 1), 7: (1, 1), 8: (1, 0)}.get(orientation, (0, 0))
+    flips = {2: (0, 1), 3: (1, 1), 4: (1, 0), 6: (0, 1), 7: (1, 1), 8: (1, 0)}
+    flip_rows, flip_columns = flips.get(orientation, (0, 0))
     return pixels[::-1 if flip_rows else 1, ::-1 if flip_columns else 1]
 
 
@@ -219,7 +220,7 @@ def quantise_srgb(linear):
 
 
 def write_png_srgb(path, linear):
-    """Write linear RGB (h, w, 3), row 0 = top, as a dithered 8-bit sRGB PNG. Raises ValueError for NaN, ArtefactError."""
+    """Write linear RGB (h, w, 3), row 0 = top, as a dithered 8-bit sRGB PNG. Raises ValueError, ArtefactError."""
     linear = np.asarray(linear)
     if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
         raise ValueError(f"linear: expected finite (h, w, 3), found {linear.shape}")

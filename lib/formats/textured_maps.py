@@ -71,7 +71,8 @@ def load(path):
     """Read a TexturedMaps; raises ArtefactError."""
     header, arrays = artefact.read(path, KIND, VERSION)
     try:
-        light, final = (MapSet(**{name: arrays[f"{prefix}_{name}"] for name in FIELDS}) for prefix in ("light", "final"))
+        light = MapSet(**{name: arrays[f"light_{name}"] for name in FIELDS})
+        final = MapSet(**{name: arrays[f"final_{name}"] for name in FIELDS})
         x = TexturedMaps(header["names"], light, final, arrays["E"], arrays["rho_avg"], arrays["textured"],
                          header["pictures"], header["stats"])
     except KeyError as error:
@@ -81,7 +82,7 @@ def load(path):
 
 
 def merge(chunks):
-    """Return the TexturedMaps of all chunks together, ascending by surface. Raises ValueError if a surface is in two."""
+    """Return the TexturedMaps of all chunks together, ascending by surface. ValueError if a surface is in two."""
     chunks = list(chunks)
     order = np.argsort(np.concatenate([c.light.surface for c in chunks]), kind="stable")
     names = [name for c in chunks for name in c.names]

@@ -2,13 +2,13 @@
 
 Sources: equation (1) of Moeller 1996, after Cohen et al. 1986:  B_final(u, v) = B(u, v) rho(u, v) / rho_avg.
 
-Conventions: a picture is (H, W, 3) linear RGB, row 0 = its top; `repeat` = (n, m) copies of it tile [0, 1]^2, upright, v up.
-Pixel (row j, column i) covers the square of side 1/(n W) x 1/(m H) round its centre; the first tile's centre is at
-u = (i + 0.5)/(n W), v = (1 - (j + 0.5)/H)/m.  A map's samples lie on crossings, u = i/(w - 1), so one is never resized into
-the other: the picture is *evaluated* at crossings by a box of one map spacing or one pixel, whichever is wider.  A box of one
-pixel over constant squares is bilinear interpolation of the pixel centres.  Past the border of the domain the picture goes
-round where it is tiled or the surface is closed; elsewhere the box is cut off there, which repeats the border pixel and
-keeps the mean.
+Conventions: a picture is (H, W, 3) linear RGB, row 0 = its top; `repeat` = (n, m) copies of it tile [0, 1]^2,
+upright, v up. Pixel (row j, column i) covers the square of side 1/(n W) x 1/(m H) round its centre; the first tile's
+centre is at u = (i + 0.5)/(n W), v = (1 - (j + 0.5)/H)/m.  A map's samples lie on crossings, u = i/(w - 1), so one is
+never resized into the other: the picture is *evaluated* at crossings by a box of one map spacing or one pixel,
+whichever is wider.  A box of one pixel over constant squares is bilinear interpolation of the pixel centres.  Past
+the border of the domain the picture goes round where it is tiled or the surface is closed; elsewhere the box is cut
+off there, which repeats the border pixel and keeps the mean.
 """
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def rho_average(surface, picture, repeat=(1, 1)):
 
     surface : NurbsSurface;  picture : (H, W, 3) linear RGB in [0, 1];  repeat : tiles (n, m) > 0.
 
-    Exact for constant pictures on any surface and for any picture where |S_u x S_v| is constant; else midpoint rule on at
-    least CELLS^2 cells that never straddle a knot.
+    Exact for constant pictures on any surface and for any picture where |S_u x S_v| is constant; else midpoint rule
+    on at least CELLS^2 cells that never straddle a knot.
     """
     rho, weight = rho_cells(surface, picture, repeat)
     low = rho.min(axis=(0, 1))  # taken off first: a constant picture keeps its value to the last bit
@@ -66,7 +66,7 @@ def _cell_edges(knots, n_pixels):
 
 
 def _cell_values(array, edges, repeat, wrap, axis):
-    """Return the mean of a picture over each cell: its integral where pixels are many, else the middle of a linear piece."""
+    """Return the mean over each cell: its integral where pixels are many, else the middle of a linear piece."""
     n = array.shape[axis] * repeat
     if n > 2 * CELLS:
         return _box(array, edges[:-1] * n, edges[1:] * n, axis)
@@ -158,8 +158,8 @@ def common_level(roots, level, picture_size, repeat, texture_level=10):
 def upsample(value, hidden, levels):
     """Interpolate a map bilinearly onto the grid `levels` deeper; samples on shared crossings keep their bits.
 
-    value (h, w, ...) float32, hidden (h, w) bool. Hidden samples take no part; a new sample is hidden if all the samples
-    it would come from are. Returns (value, hidden); hidden values are 0.
+    value (h, w, ...) float32, hidden (h, w) bool. Hidden samples take no part; a new sample is hidden if all the
+    samples it would come from are. Returns (value, hidden); hidden values are 0.
     """
     factor = 1 << int(levels)
     seen = (~hidden).reshape(hidden.shape + (1,) * (value.ndim - 2))
@@ -193,7 +193,8 @@ def reflected(H, rho_avg):
 def apply(B, rho, rho_avg):
     """Return B_final = B rho / rho_avg (h, w, 3) float32, the light on the base texture (equation 1).
 
-    B, rho : (h, w, 3) on the same crossings;  rho_avg : (3,). A channel with rho_avg = 0 has rho = 0 everywhere and gets 0.
+    B, rho : (h, w, 3) on the same crossings;  rho_avg : (3,). A channel with rho_avg = 0 has rho = 0 everywhere and
+    gets 0.
     """
     rho_avg = np.asarray(rho_avg, np.float64)
     factor = np.divide(1, rho_avg, out=np.zeros(3), where=rho_avg > 0)

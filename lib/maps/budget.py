@@ -1,9 +1,10 @@
 """Meet a texture budget by removing the deepest quadtree level of the map that loses least, again and again.
 
-Sources: Moeller 1996, section 6 (D_i, S, T).  Departures: the low pass keeps ramps at borders (odd reflection) and goes round
-closed directions; hidden samples take no part.
+Sources: Moeller 1996, for D_i, S and T.  Departures: the low pass keeps ramps at borders (odd reflection) and
+goes round closed directions; hidden samples take no part.
 
-Conventions: maps (h, w, 3), [j, i], side = roots 2^level + 1.  "Kept" samples have even i and even j; D_i is summed over the others.
+Conventions: maps (h, w, 3), [j, i], side = roots 2^level + 1.  "Kept" samples have even i and even j; D_i is summed
+over the others.
 """
 from __future__ import annotations
 
@@ -85,9 +86,9 @@ def _loss(value, seen, total, weight):
 def low_pass(value, hidden, closed=(False, False)):
     """Return the map one level up: (1, 2, 1)/4 along both directions, read at the kept samples; and its hidden mask.
 
-    At a border the map is continued by odd reflection (v[-1] = 2 v[0] - v[1]), so a border row is filtered along itself
-    only, corners stay, and ramps stay ramps. Along a `closed` direction (u, v) it goes round and the last line equals the
-    first. A sample with a hidden neighbour on a line is treated like a border sample of that line.
+    At a border the map is continued by odd reflection (v[-1] = 2 v[0] - v[1]), so a border row is filtered along
+    itself only, corners stay, and ramps stay ramps. Along a `closed` direction (u, v) it goes round and the last line
+    equals the first. A sample with a hidden neighbour on a line is treated like a border sample of that line.
     """
     seen = ~hidden
     exact = np.where(seen[..., None], value, 0).astype(np.float64)

@@ -1,7 +1,8 @@
 """Values for hidden samples, the last thing done to a map before it is written.
 
-`one_deep` gives the texels beside visible ones the mean of those and all others 0 (EXR maps); `push_pull` fills everything
-(exported textures, whose mips read far into the hidden part).  Maps are (h, w, ...), masks (h, w) bool, True = hidden.
+`one_deep` gives the texels beside visible ones the mean of those and all others 0 (EXR maps); `push_pull` fills
+everything (exported textures, whose mips read far into the hidden part).  Maps are (h, w, ...), masks (h, w) bool,
+True = hidden.
 """
 import numpy as np
 
@@ -29,7 +30,7 @@ def one_deep(value, hidden, closed=(False, False)):
 
 
 def _ring(array, closed, outside=0):
-    """Return array with one more row and column on each side: what lies there along closed directions, else `outside`."""
+    """Return array with one more row and column on each side: what lies there on closed ones, else outside."""
     array = np.pad(array, [(1, 1), (1, 1)] + [(0, 0)] * (array.ndim - 2), constant_values=outside)
     if closed[0] and array.shape[1] > 4:
         array[:, 0], array[:, -1] = array[:, -3], array[:, 2]
@@ -41,8 +42,8 @@ def _ring(array, closed, outside=0):
 def push_pull(value, hidden):
     """Return a copy of value with every hidden texel filled smoothly from the visible ones; 0 where none is visible.
 
-    Push: halve the map, averaging visible texels, until one texel is left. Pull: fill what is empty from the level above,
-    bilinearly. Visible texels keep their bits.  [Gortler et al. 1996, The Lumigraph, section 3.4]
+    Push: halve the map, averaging visible texels, until one texel is left. Pull: fill what is empty from the level
+    above, bilinearly. Visible texels keep their bits.  [Gortler et al. 1996, The Lumigraph]
     """
     if not hidden.any():
         return value.copy()

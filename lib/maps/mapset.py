@@ -1,7 +1,7 @@
 """The maps of many surfaces in one packed array.
 
-Conventions: a map is indexed [j, i] = [v row, u column], row 0 is v = 0; sample i lies on the grid crossing u = i/(w - 1).
-Side lengths are w = roots_u 2^level + 1 and h = roots_v 2^level + 1.
+Conventions: a map is indexed [j, i] = [v row, u column], row 0 is v = 0; sample i lies on the grid crossing
+u = i/(w - 1). Side lengths are w = roots_u 2^level + 1 and h = roots_v 2^level + 1.
 """
 from __future__ import annotations
 
