@@ -40,7 +40,9 @@ def basis(knots, degree, n, u):
 
 
 def _shift(a, left):
-    return np.pad(a, ((0, 0), (left, 1 - left)))
+    out = np.zeros((len(a), a.shape[1] + 1))  # np.pad takes ten times as long
+    out[:, left : left + a.shape[1]] = a
+    return out
 
 
 def evaluate(surface, u, v):

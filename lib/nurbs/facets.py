@@ -1,0 +1,167 @@
+"""One surface cut along lines into triangles, with its measured distance from them.
+
+Every cell of the tensor grid gives two triangles, divided by the diagonal that lies closer to the surface.  Along a pole a cell gives one:
+each has a vertex of its own there, at the u (or v) of its middle, so that texture coordinates interpolate as they should.
+Distances are taken between exact points, a 4x4 sampling of each cell, and the facet at the same parameters: `distance` is measured
+perpendicular to the facet, and on open sides perpendicular to the edge (so it is what an eye or a ray sees); `slide` is the whole vector,
+with what a texture moves inside the surface.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lib.nurbs.evaluate import evaluate_grid
+
+STEPS = 4  # samples per cell and direction
+FLAT = 1e-12  # a triangle of less area than this share of its longest edge squared has none
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Triangles of one surface; geometric normals point along S_u x S_v.
+
+    S (k, 3), UV (k, 2)  vertices and their parameters; F (m, 3) int64
+    side : four int arrays, the vertices along u=0, u=1, v=0, v=1 with the parameter ascending; a pole's side holds its vertices
+    distance : largest distance [unit of the surface]; square : its mean square, weighted by area; slide : largest slide
+    area : of the triangles
+    """
+
+    S: np.ndarray
+    UV: np.ndarray
+    F: np.ndarray
+    side: tuple
+    distance: float
+    square: float
+    slide: float
+    area: float
+
+
+def _finer(lines):
+    """The lines with STEPS - 1 equal steps put between."""
+    t = np.arange(STEPS) / STEPS
+    return np.append((lines[:-1, None] + np.diff(lines)[:, None] * t).ravel(), lines[-1])
+
+
+def triangulate(surface, u, v, is_closed, is_collapsed):
+    """Cut a surface along its lines u, v (ascending, 0 and 1 among them); is_closed (2,), is_collapsed (4,)."""
+    fine = evaluate_grid(surface, _finer(u), _finer(v))[0]
+    S = fine[::STEPS, ::STEPS]
+    cells = _cells(fine, len(v) - 1, len(u) - 1)
+    corner = (S[:-1, :-1], S[:-1, 1:], S[1:, 1:], S[1:, :-1])  # 00, 10, 11, 01
+    is_falling = _diagonal(corner, cells[..., STEPS // 2, STEPS // 2, :])
+    distance, square, slide, area = _distances(cells, corner, is_falling, is_collapsed)
+    side_distance = max([_side_distance(fine, k) for k in range(4) if not (is_closed[k // 2] or is_collapsed[k])], default=0.0)
+    points, parameters, F, side = _mesh(S, u, v, is_falling, is_collapsed)
+    return Patch(points, parameters, F, side, max(distance, side_distance), square, slide, area)
+
+
+def _cells(fine, n_v, n_u):
+    """Samples by cell, borders included: (n_v, n_u, 5, 5, 3), [.., v, u, :]."""
+    window = np.lib.stride_tricks.sliding_window_view(fine, (STEPS + 1, STEPS + 1), axis=(0, 1))
+    return np.moveaxis(window[::STEPS, ::STEPS], 2, -1)[:n_v, :n_u]
+
+
+def _diagonal(corner, middle):
+    """True where the diagonal 10-01 is closer to the surface than 00-11, which is kept when they tie."""
+    S00, S10, S11, S01 = corner
+    rising = np.linalg.norm(middle - (S00 + S11) / 2, axis=-1)
+    falling = np.linalg.norm(middle - (S10 + S01) / 2, axis=-1)
+    return falling < rising * (1 - 1e-6) - 1e-9 * np.linalg.norm(S11 - S00, axis=-1)
+
+
+def _distances(cells, corner, is_falling, is_collapsed):
+    """(largest distance, mean square, largest slide, area) of the cells' samples to their triangles."""
+    S00, S10, S11, S01 = corner
+    a = np.arange(STEPS + 1) / STEPS
+    x, y = np.meshgrid(a, a)  # u and v inside the cell
+    flip = is_falling[..., None]
+    # as if every diagonal rose: mirrored cells swap their left and right corners
+    A, B, C, D = np.where(flip, S10, S00), np.where(flip, S00, S10), np.where(flip, S01, S11), np.where(flip, S11, S01)
+    samples = np.where(is_falling[..., None, None, None], cells[..., ::-1, :], cells)
+    weights = np.stack([1 - np.maximum(x, y), np.maximum(x - y, 0), np.minimum(x, y), np.maximum(y - x, 0)], axis=-1)
+    facet = np.einsum("vuk,jick->jivuc", weights, np.stack([A, B, C, D], axis=-1))
+    off = samples - facet
+    below, area_below = _normals(A, B, C)
+    above, area_above = _normals(A, C, D)
+    _along_poles(below, area_below, above, area_above, is_collapsed)
+    height = np.where(x > y, np.abs(np.einsum("jivuc,jic->jivu", off, below)), np.abs(np.einsum("jivuc,jic->jivu", off, above)))
+    cell_area = area_below + area_above
+    total = max(float(cell_area.sum()), 1e-300)
+    square = float((cell_area * (height**2).mean(axis=(2, 3))).sum()) / total
+    return float(height.max()), square, float(np.linalg.norm(off, axis=-1).max()), float(cell_area.sum())
+
+
+def _normals(A, B, C):
+    cross = np.cross(B - A, C - A)
+    double = np.linalg.norm(cross, axis=-1)
+    return cross / np.maximum(double, 1e-300)[..., None], double / 2
+
+
+def _along_poles(below, area_below, above, area_above, is_collapsed):
+    """Along a collapsed side one triangle stands for the whole cell: give its plane to both halves."""
+    for k, cells in enumerate([np.s_[:, 0], np.s_[:, -1], np.s_[0], np.s_[-1]]):
+        if is_collapsed[k]:
+            larger = (area_below[cells] > area_above[cells])[..., None]
+            below[cells] = above[cells] = np.where(larger, below[cells], above[cells])
+
+
+def _side_distance(fine, k):
+    """Largest distance of side k's samples from its edges."""
+    line = (fine[:, 0], fine[:, -1], fine[0], fine[-1])[k]
+    start, along = line[:-1:STEPS], np.diff(line[::STEPS], axis=0)
+    length = np.linalg.norm(along, axis=1, keepdims=True)
+    along = np.where(length > 0, along / np.maximum(length, 1e-300), 0.0)[:, None]
+    off = line[:-1].reshape(-1, STEPS, 3) - start[:, None]
+    off = off - np.einsum("ksc,ksc->ks", off, np.broadcast_to(along, off.shape))[..., None] * along
+    return float(np.linalg.norm(off, axis=2).max())
+
+
+def _mesh(S, u, v, is_falling, is_collapsed):
+    """Vertices, parameters, triangles and sides of the grid S (n_v + 1, n_u + 1, 3)."""
+    rows, columns = S.shape[:2]
+    uu, vv = np.meshgrid(u, v)
+    points, parameters = [S.reshape(-1, 3)], [np.stack([uu, vv], axis=-1).reshape(-1, 2)]
+    G = np.arange(rows * columns).reshape(rows, columns)
+    c00, c10, c11, c01 = G[:-1, :-1].copy(), G[:-1, 1:].copy(), G[1:, 1:].copy(), G[1:, :-1].copy()
+    side = [G[:, 0].copy(), G[:, -1].copy(), G[0].copy(), G[-1].copy()]
+    n = G.size
+    ends = ((c00, c01), (c10, c11), (c00, c10), (c01, c11))
+    for k in np.flatnonzero(is_collapsed):
+        lines = v if k < 2 else u
+        middle = (lines[:-1] + lines[1:]) / 2
+        pole = np.arange(n, n + middle.size)
+        n += middle.size
+        strip = np.s_[:, -(k % 2)] if k < 2 else np.s_[-(k % 2)]
+        for c in ends[k]:
+            c[strip] = pole
+        points.append(np.repeat(S[0, 0][None] if k in (0, 2) else S[-1, -1][None], middle.size, axis=0))
+        at = np.full_like(middle, float(k % 2))
+        parameters.append(np.stack([at, middle] if k < 2 else [middle, at], axis=1))
+        side[k] = pole
+        for other in range(4):  # the corners of the neighbouring sides lie on the pole now
+            if other // 2 != k // 2:
+                place = 0 if k % 2 == 0 else -1
+                side[other][place] = pole[0 if other % 2 == 0 else -1]
+    first = np.where(is_falling[..., None], np.stack([c00, c10, c01], -1), np.stack([c00, c10, c11], -1))
+    second = np.where(is_falling[..., None], np.stack([c10, c11, c01], -1), np.stack([c00, c11, c01], -1))
+    F = np.stack([first, second], axis=2).reshape(-1, 3)
+    points, parameters = np.concatenate(points), np.concatenate(parameters)
+    F = F[has_area(points, F)]
+    return _compact(points, parameters, F, side)
+
+
+def has_area(points, F):
+    """Mask of the triangles F (m, 3) whose corners are three and do not lie on one line."""
+    three = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
+    A, B, C = points[F[:, 0]], points[F[:, 1]], points[F[:, 2]]
+    longest = np.max([np.linalg.norm(X, axis=1) for X in (B - A, C - B, A - C)], axis=0, initial=0.0)
+    return three & (np.linalg.norm(np.cross(B - A, C - A), axis=1) > FLAT * longest**2)
+
+
+def _compact(points, parameters, F, side):
+    """Drop vertices no triangle uses (the grid's own pole row); sides keep those that are left."""
+    used = np.zeros(len(points), dtype=bool)
+    used[F.ravel()] = True
+    number = np.cumsum(used) - 1
+    return points[used], parameters[used], number[F], tuple(number[s[used[s]]] for s in side)

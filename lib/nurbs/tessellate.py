@@ -1,0 +1,165 @@
+"""The mesh of a whole scene: every surface cut along its lines, neighbours meeting without a crack.
+
+`shapes` finds once what surfaces are and how they touch; `mesh` cuts them for given tolerances.  Along borders of equal speed, along seams
+and at poles the vertices of all sides take the position of the first of them, bit by bit, so nothing can slip through.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lib.nurbs import borders as find_borders
+from lib.nurbs import lines as find_lines
+from lib.nurbs import shape
+from lib.nurbs.evaluate import evaluate_grid
+from lib.nurbs.facets import has_area, triangulate
+
+NINE = np.linspace(0.0, 1.0, 9)
+SLIDE = 0.01  # share of its size by which a texture may slide on a surface
+ROUNDS = 8  # of measuring and cutting finer
+
+
+@dataclass(frozen=True)
+class Shapes:
+    """What n surfaces are, in the unit of the surfaces given.
+
+    area (n,), extent (n, 2) mean length along u and v, is_planar (n,), is_closed (n, 2), is_collapsed (n, 4)
+    borders (m, 5) int32 [surface a, side a, surface b, side b, reversed], shell (n,) int32 or -1
+    """
+
+    area: np.ndarray
+    extent: np.ndarray
+    is_planar: np.ndarray
+    is_closed: np.ndarray
+    is_collapsed: np.ndarray
+    borders: np.ndarray
+    shell: np.ndarray
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles of n surfaces, packed surface after surface.
+
+    V (n_v, 3), UV (n_v, 2), F (n_f, 3) int32; vertex_start, face_start (n + 1,) int64
+    distance (n,) largest distance to the surface, welding included; rms (n,) its root mean square; slide (n,); area (n,) of the facets
+    side : per surface, four arrays of vertices along its sides
+    """
+
+    V: np.ndarray
+    UV: np.ndarray
+    F: np.ndarray
+    vertex_start: np.ndarray
+    face_start: np.ndarray
+    distance: np.ndarray
+    rms: np.ndarray
+    slide: np.ndarray
+    area: np.ndarray
+    side: list
+
+
+def frame(surfaces):
+    """(centre (3,), scale) of the box around a 9x9 grid of points of every surface: x' = (x - centre) / scale."""
+    points = np.concatenate([evaluate_grid(s, NINE, NINE)[0].reshape(-1, 3) for s in surfaces])
+    low, high = points.min(axis=0), points.max(axis=0)
+    return (low + high) / 2, float((high - low).max())
+
+
+def into_frame(surfaces, centre, scale):
+    """The surfaces in the frame."""
+    M = np.eye(4)
+    M[:3, :3] /= scale
+    M[:3, 3] = -np.asarray(centre) / scale
+    return [shape.transformed(s, M) for s in surfaces]
+
+
+def shapes(surfaces, takes_part):
+    """Measure the surfaces; takes_part (n,) bool: those that may be part of a closed shell."""
+    is_closed = np.array([shape.is_closed(s) for s in surfaces]).reshape(-1, 2)
+    is_collapsed = np.array([shape.collapsed_sides(s) for s in surfaces]).reshape(-1, 4)
+    border, shell = find_borders.find(surfaces, is_closed, is_collapsed, np.asarray(takes_part, dtype=bool))
+    return Shapes(np.array([shape.area(s) for s in surfaces]), np.array([shape.extent(s) for s in surfaces]).reshape(-1, 2),
+                  np.array([shape.is_planar(s) for s in surfaces]), is_closed, is_collapsed, border, shell)
+
+
+def plan(surfaces, known):
+    """Everything about where lines go that does not depend on a tolerance (lib.nurbs.lines.Plan)."""
+    demands = [find_lines.demand(s, c, p) for s, c, p in zip(surfaces, known.is_closed, known.is_collapsed, strict=True)]
+    return find_lines.plan(demands, find_lines.links(len(surfaces), known.borders))
+
+
+def n_triangles(p, known, count):
+    """Triangles of every surface (n,) when its line sets have `count` steps."""
+    n_u, n_v = find_lines.per_surface(p, count).T
+    poles = known.is_collapsed.astype(np.int64)
+    return 2 * n_u * n_v - (poles[:, 0] + poles[:, 1]) * n_v - (poles[:, 2] + poles[:, 3]) * n_u
+
+
+def cut(surfaces, known, p, tolerance, slide):
+    """Cut all surfaces for tolerance (n,) and slide (n,), as planned and not yet measured against it: a list of Patch."""
+    both = np.stack([tolerance, slide], axis=1)
+    placed = find_lines.place(p, both, find_lines.steps(p, both))
+    return [triangulate(*each) for each in zip(surfaces, *zip(*placed, strict=True), known.is_closed, known.is_collapsed, strict=True)]
+
+
+def cut_within(surfaces, known, p, tolerance, slide):
+    """Cut all surfaces so that the measured distance stays within tolerance (n,): ask for more where it does not, and measure again."""
+    ask, patches, before = tolerance.copy(), [None] * len(surfaces), None
+    for _ in range(ROUNDS):
+        both = np.stack([ask, slide], axis=1)
+        placed = find_lines.place(p, both, find_lines.steps(p, both))
+        for s, (u, v) in enumerate(placed):
+            if before is None or not (np.array_equal(u, before[s][0]) and np.array_equal(v, before[s][1])):
+                patches[s] = triangulate(surfaces[s], u, v, known.is_closed[s], known.is_collapsed[s])
+        before = placed
+        distance = np.array([p.distance for p in patches])
+        over = (distance > tolerance) & ~(known.is_planar & (distance <= 1e-7))
+        if not over.any():
+            break
+        ask[over] *= np.minimum(tolerance[over] / distance[over], 1) / 1.03
+    return patches
+
+
+def assemble(patches, known):
+    """Pack the patches into one Mesh, its borders, seams and poles welded."""
+    vertex_start = np.concatenate([[0], np.cumsum([len(p.S) for p in patches])]).astype(np.int64)
+    side = [tuple(k + start for k in p.side) for p, start in zip(patches, vertex_start[:-1], strict=True)]
+    V, moved = _weld(np.concatenate([p.S for p in patches]), side, known)
+    F = [p.F + start for p, start in zip(patches, vertex_start[:-1], strict=True)]
+    F = [f[has_area(V, f)] for f in F]
+    face_start = np.concatenate([[0], np.cumsum([len(f) for f in F])]).astype(np.int64)
+    moved = np.maximum.reduceat(moved, vertex_start[:-1])
+    return Mesh(V, np.concatenate([p.UV for p in patches]), np.concatenate(F).astype(np.int32), vertex_start, face_start,
+                np.array([p.distance for p in patches]) + moved, np.sqrt([p.square for p in patches]),
+                np.array([p.slide for p in patches]), np.array([p.area for p in patches]), side)
+
+
+def _weld(V, side, known):
+    """Positions with those of one place made equal, and how far each vertex moved (n_v,)."""
+    a, b = [], []
+    for s, own in enumerate(side):
+        for k in np.flatnonzero(known.is_collapsed[s]):
+            a.append(np.broadcast_to(own[k][:1], own[k].shape))
+            b.append(own[k])
+        for d in np.flatnonzero(known.is_closed[s]):
+            a.append(own[2 * d])
+            b.append(own[2 * d + 1])
+    for s, k, t, m, is_reversed in known.borders.tolist():
+        first, second = side[s][k], side[t][m]
+        if len(first) == len(second):
+            a.append(first)
+            b.append(second[::-1] if is_reversed else second)
+    same = np.arange(len(V))
+    if a:
+        a, b = np.concatenate(a), np.concatenate(b)
+        while True:  # the smallest number of all vertices in one place
+            low = np.minimum(same[a], same[b])
+            smallest = same.copy()
+            np.minimum.at(smallest, a, low)
+            np.minimum.at(smallest, b, low)
+            np.minimum.at(smallest, same[a], low)
+            np.minimum.at(smallest, same[b], low)
+            smallest = smallest[smallest]
+            if (smallest == same).all():
+                break
+            same = smallest
+    return V[same], np.linalg.norm(V[same] - V, axis=1)
