@@ -13,7 +13,8 @@ def linear_to_srgb(linear):
     """Return the sRGB encoding of linear light in [0, 1]; values outside are clipped to it first."""
     linear = np.clip(_floating(linear), 0, 1)
     low = linear <= 0.0031308
-    return np.where(low, linear * 12.92, 1.055 * np.where(low, 1, linear) ** (1 / 2.4) - 0.055).astype(linear.dtype)
+    # 1.055 x^(1/2.4) - 0.055, written so that 1 stays 1
+    return np.where(low, linear * 12.92, 1 + 1.055 * (np.where(low, 1, linear) ** (1 / 2.4) - 1)).astype(linear.dtype)
 
 
 def _floating(values):
