@@ -1,10 +1,12 @@
-"""Make the mesh that casts shadows, close enough to the exact surfaces for rays, and find out what each surface is as a shape.
+"""Make the mesh that casts shadows, close enough to the exact surfaces for rays, and find out what each surface is as
+a shape.
 
 reads   scene.npz                                                           (lib.formats.scene)
         settings: {"sag": largest distance from the exact surface, share of the scene's largest side (default 0.001)}
 writes  casters.npz                                                         (lib.formats.casters)
 
-A surface is also kept within 2/1000 of its own size, so that small objects stay round. No level of detail touches this mesh.
+A surface is also kept within 2/1000 of its own size, so that small objects stay round. No level of detail touches
+this mesh.
 """
 
 import json
@@ -32,8 +34,13 @@ def body(args, cost):
         raise refusal(f"{sag:g}, allowed are 0.000001 to 0.1", field="sag")
     made = make(x.surfaces, x.flip, x.role, sag)
     casters.save(args.out, made)
-    cost.notes.update(triangles=len(made.F), surfaces=len(x.surfaces), borders=len(made.borders),
-                      shells=int(made.shell.max(initial=-1)) + 1, sag=float(made.sag.max(initial=0.0)))
+    cost.notes.update(
+        triangles=len(made.F),
+        surfaces=len(x.surfaces),
+        borders=len(made.borders),
+        shells=int(made.shell.max(initial=-1)) + 1,
+        sag=float(made.sag.max(initial=0.0)),
+    )
 
 
 def make(surfaces, flip, role, sag):
@@ -43,16 +50,28 @@ def make(surfaces, flip, role, sag):
     surfaces = tessellate.into_frame(surfaces, centre, scale)
     known = tessellate.shapes(surfaces, blocks)
     size = known.extent.max(axis=1)
-    patches = tessellate.cut_within(surfaces, known, tessellate.plan(surfaces, known), np.minimum(sag, OWN_SAG * size),
-                                    tessellate.SLIDE * size)
+    patches = tessellate.cut_within(
+        surfaces, known, tessellate.plan(surfaces, known), np.minimum(sag, OWN_SAG * size), tessellate.SLIDE * size
+    )
     mesh = tessellate.assemble(patches, known)
     F, face_surface = mesh.F.copy(), np.repeat(np.arange(len(surfaces), dtype=np.int32), np.diff(mesh.face_start))
     F[np.asarray(flip, dtype=bool)[face_surface]] = F[np.asarray(flip, dtype=bool)[face_surface]][:, ::-1]
     keep = blocks[face_surface]
     return casters.Casters(
-        centre=centre, scale=scale, V=mesh.V, UV=mesh.UV, F=F[keep], face_surface=face_surface[keep],
-        area=known.area, extent=known.extent, sag=np.where(known.is_planar, 0.0, mesh.distance), is_planar=known.is_planar,
-        is_closed=known.is_closed, is_collapsed=known.is_collapsed, shell=known.shell, borders=known.borders,
+        centre=centre,
+        scale=scale,
+        V=mesh.V,
+        UV=mesh.UV,
+        F=F[keep],
+        face_surface=face_surface[keep],
+        area=known.area,
+        extent=known.extent,
+        sag=np.where(known.is_planar, 0.0, mesh.distance),
+        is_planar=known.is_planar,
+        is_closed=known.is_closed,
+        is_collapsed=known.is_collapsed,
+        shell=known.shell,
+        borders=known.borders,
     )
 
 

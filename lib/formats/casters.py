@@ -1,4 +1,4 @@
-"""Artefact of tessellate: the mesh that casts shadows, and what the surfaces are as shapes; everything in the scene's frame."""
+"""Artefact of tessellate: the shadow casting mesh and the surfaces' shapes, all in the scene's frame."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ KIND, VERSION = "casters", 1
 
 @dataclass(frozen=True)
 class Casters:
-    """Triangles and shapes of n surfaces in the frame x' = (x - centre) / scale, whose box is centred with largest side 1.
+    """Triangles and shapes of n surfaces in the frame x' = (x - centre) / scale: its box is centred, its largest side 1.
 
     centre (3,) float64 [m], scale float > 0 [m]
     V (n_v, 3) float64, UV (n_v, 2) float64 surface parameters in [0, 1]
@@ -20,7 +20,8 @@ class Casters:
     area (n,), extent (n, 2) mean length along u, v; sag (n,) largest distance from the mesh, 0 on planar surfaces
     is_planar (n,), is_closed (n, 2) in u, v; is_collapsed (n, 4) sides u=0, u=1, v=0, v=1; all bool
     shell (n,) int32    closed shell the surface belongs to, or -1
-    borders (m, 5) int32 [surface a, side a, surface b, side b, reversed]: sides that are the same curve at the same speed
+    borders (m, 5) int32 [surface a, side a, surface b, side b, reversed]: sides that are the same curve at the same
+    speed
     """
 
     centre: np.ndarray
@@ -42,10 +43,19 @@ class Casters:
 def _expected(x):
     n, n_v, n_f = len(x.area), len(x.V), len(x.F)
     return {
-        "centre": ((3,), np.float64), "V": ((n_v, 3), np.float64), "UV": ((n_v, 2), np.float64), "F": ((n_f, 3), np.int32),
-        "face_surface": ((n_f,), np.int32), "area": ((n,), np.float64), "extent": ((n, 2), np.float64),
-        "sag": ((n,), np.float64), "is_planar": ((n,), np.bool_), "is_closed": ((n, 2), np.bool_),
-        "is_collapsed": ((n, 4), np.bool_), "shell": ((n,), np.int32), "borders": ((len(x.borders), 5), np.int32),
+        "centre": ((3,), np.float64),
+        "V": ((n_v, 3), np.float64),
+        "UV": ((n_v, 2), np.float64),
+        "F": ((n_f, 3), np.int32),
+        "face_surface": ((n_f,), np.int32),
+        "area": ((n,), np.float64),
+        "extent": ((n, 2), np.float64),
+        "sag": ((n,), np.float64),
+        "is_planar": ((n,), np.bool_),
+        "is_closed": ((n, 2), np.bool_),
+        "is_collapsed": ((n, 4), np.bool_),
+        "shell": ((n,), np.int32),
+        "borders": ((len(x.borders), 5), np.int32),
     }
 
 
@@ -55,7 +65,8 @@ def check(x, path="casters"):
         array = getattr(x, name)
         if array.shape != shape or array.dtype != dtype:
             raise artefact.ArtefactError(
-                f"{path}: {name}: {array.shape} {array.dtype}, expected {shape} {np.dtype(dtype).name}")
+                f"{path}: {name}: {array.shape} {array.dtype}, expected {shape} {np.dtype(dtype).name}"
+            )
         if array.dtype == np.float64 and not np.isfinite(array).all():
             raise artefact.ArtefactError(f"{path}: {name}: NaN or Inf, expected finite numbers")
     n = len(x.area)
@@ -63,12 +74,12 @@ def check(x, path="casters"):
         "scale": x.scale > 0,
         "UV": (x.UV >= 0).all() and (x.UV <= 1).all(),
         "F": not len(x.F) or (x.F.min() >= 0 and x.F.max() < len(x.V)),
-        "face_surface": not len(x.F) or (x.face_surface.min() >= 0 and x.face_surface.max() < n
-                                         and (np.diff(x.face_surface) >= 0).all()),
+        "face_surface": not len(x.F)
+        or (x.face_surface.min() >= 0 and x.face_surface.max() < n and (np.diff(x.face_surface) >= 0).all()),
         "area": (x.area > 0).all(),
         "sag": (x.sag >= 0).all(),
-        "borders": not len(x.borders) or (x.borders.min() >= 0 and x.borders[:, [0, 2]].max() < n
-                                          and x.borders[:, [1, 3]].max() < 4),
+        "borders": not len(x.borders)
+        or (x.borders.min() >= 0 and x.borders[:, [0, 2]].max() < n and x.borders[:, [1, 3]].max() < 4),
     }
     for name, holds in rules.items():
         if not holds:

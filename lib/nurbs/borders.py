@@ -1,8 +1,9 @@
 """Which sides of which surfaces are the same curve: borders with equal speed, and closed shells.
 
-Sides are numbered 0 u=0, 1 u=1, 2 v=0, 3 v=1; a side runs along the other parameter.  Two sides make a border when nine points at equal
-parameters agree, forwards or backwards: then both surfaces can be cut at the same parameters and meet without a crack.  For a shell it
-is enough that the two curves are the same as point sets.  Candidates come from a spatial hash, so the cost grows with the number of sides.
+Sides are numbered 0 u=0, 1 u=1, 2 v=0, 3 v=1; a side runs along the other parameter.  Two sides make a border when
+nine points at equal parameters agree, forwards or backwards: then both surfaces can be cut at the same parameters and
+meet without a crack.  For a shell it is enough that the two curves are the same as point sets.  Candidates come from
+a spatial hash, so the cost grows with the number of sides.
 """
 
 from dataclasses import dataclass
@@ -47,7 +48,7 @@ def sides(surfaces):
 
 
 def neighbours(keys, within):
-    """Pairs of rows i < j (m, 2) whose points `keys` (n, 3) may lie within `within` (n,) of each other: a spatial hash."""
+    """Pairs of rows i < j (m, 2) whose points `keys` (n, 3) may lie within `within` (n,): a spatial hash."""
     if len(keys) < 2:
         return np.empty((0, 2), dtype=np.int64)
     cell = 4 * max(within.max(), 1e-15 * np.abs(keys).max(), 1e-300)
@@ -67,7 +68,7 @@ def neighbours(keys, within):
 
 
 def same_speed(data, usable):
-    """Borders (m, 5) int32 [surface a, side a, surface b, side b, reversed], rows sorted; only sides where `usable` (4 n,)."""
+    """Borders (m, 5) int32 [surface a, side a, surface b, side b, reversed], among the sides where `usable` (4 n,)."""
     rows = np.flatnonzero(usable)
     middle = data.points.shape[1] // 2
     pair = rows[neighbours(data.points[rows, middle], data.within[rows])]
@@ -77,21 +78,32 @@ def same_speed(data, usable):
     backwards = np.linalg.norm(a - b[:, ::-1], axis=2).max(axis=1, initial=0.0)
     same = np.minimum(forwards, backwards) <= within
     pair, is_reversed = pair[same], (backwards < forwards)[same]
-    return np.column_stack([pair[:, 0] // 4, pair[:, 0] % 4, pair[:, 1] // 4, pair[:, 1] % 4, is_reversed]).astype(np.int32)
+    return np.column_stack([pair[:, 0] // 4, pair[:, 0] % 4, pair[:, 1] // 4, pair[:, 1] % 4, is_reversed]).astype(
+        np.int32
+    )
 
 
-def same_curve(data, usable):
-    """Pairs of sides (m, 2), rows of `data`, that are the same curve at any speed and in any direction."""
+def same_curve(data, usable, known):
+    """Pairs of sides (m, 2), rows of `data`, that are the same curve at any speed and in any direction.
+
+    known : (k, 2) pairs, smaller row first, that need no test and are left out
+    """
     rows = np.flatnonzero(usable)
     ends = data.points[:, [0, -1]]
     pair = rows[neighbours(ends.mean(axis=1)[rows], data.within[rows])]
+    number = [p[:, 0] * len(data.length) + p[:, 1] for p in (pair, known)]
+    pair = pair[~np.isin(*number)]
     a, b = ends[pair[:, 0]], ends[pair[:, 1]]
-    gap = np.minimum(np.linalg.norm(a - b, axis=2).max(axis=1, initial=0.0),
-                     np.linalg.norm(a - b[:, ::-1], axis=2).max(axis=1, initial=0.0))
+    gap = np.minimum(
+        np.linalg.norm(a - b, axis=2).max(axis=1, initial=0.0),
+        np.linalg.norm(a - b[:, ::-1], axis=2).max(axis=1, initial=0.0),
+    )
     pair = pair[gap <= np.minimum(data.within[pair[:, 0]], data.within[pair[:, 1]])]
     keep = []
     for i, j in pair:
-        far = max(_to_polyline(data.points[i, ::FINE], data.points[j]), _to_polyline(data.points[j, ::FINE], data.points[i]))
+        far = max(
+            _to_polyline(data.points[i, ::FINE], data.points[j]), _to_polyline(data.points[j, ::FINE], data.points[i])
+        )
         keep.append(far <= SAME_CURVE * min(data.length[i], data.length[j]))
     return pair[np.array(keep, dtype=bool)]
 
@@ -104,12 +116,13 @@ def _to_polyline(points, line):
     return np.linalg.norm(points[:, None] - start - t[..., None] * along, axis=2).min(axis=1).max()
 
 
-def shells(data, pairs, is_free, takes_part):
+def shells(pairs, is_free, takes_part):
     """Shell number (n,) int32 of each surface, -1 where it belongs to none.
 
-    pairs : (m, 2) rows of `data` that are the same curve; is_free : (4 n,) sides that need no partner (poles, seams);
-    takes_part : (n,) surfaces that may belong to a shell.  A surface with an unpaired side is taken away, with it the pairs it
-    gave to others, until nothing changes; the connected groups of what is left are the closed shells.
+    pairs : (m, 2) sides, 4 surface + side, that are the same curve; is_free : (4 n,) sides that need no partner
+    (poles, seams);
+    takes_part : (n,) surfaces that may belong to a shell.  A surface with an unpaired side is taken away, with it the
+    pairs it gave to others, until nothing changes; the connected groups of what is left are the closed shells.
     """
     n = len(takes_part)
     left = takes_part.copy()
@@ -148,9 +161,10 @@ def find(surfaces, is_closed, is_collapsed, takes_part):
     own_seam = (borders[:, 0] == borders[:, 2]) & (borders[:, 1] // 2 == borders[:, 3] // 2)
     seam = own_seam & is_closed[borders[:, 0], borders[:, 1] // 2]
     is_free = (is_collapsed | is_closed.repeat(2, axis=1)).ravel()
-    pairs = np.concatenate([same_curve(data, usable), _rows(borders[~seam])])
-    return borders[~seam], shells(data, pairs, is_free, takes_part)
+    pairs = np.concatenate([same_curve(data, usable, rows_of(borders)), rows_of(borders[~seam])])
+    return borders[~seam], shells(pairs, is_free, takes_part)
 
 
-def _rows(borders):
+def rows_of(borders):
+    """The pairs of sides (m, 2), 4 surface + side, of borders (m, 5)."""
     return np.stack([borders[:, 0] * 4 + borders[:, 1], borders[:, 2] * 4 + borders[:, 3]], axis=1).astype(np.int64)

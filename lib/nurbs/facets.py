@@ -1,10 +1,11 @@
 """One surface cut along lines into triangles, with its measured distance from them.
 
-Every cell of the tensor grid gives two triangles, divided by the diagonal that lies closer to the surface.  Along a pole a cell gives one:
-each has a vertex of its own there, at the u (or v) of its middle, so that texture coordinates interpolate as they should.
-Distances are taken between exact points, a 4x4 sampling of each cell, and the facet at the same parameters: `distance` is measured
-perpendicular to the facet, and on open sides perpendicular to the edge (so it is what an eye or a ray sees); `slide` is the whole vector,
-with what a texture moves inside the surface.
+Every cell of the tensor grid gives two triangles, divided by the diagonal that lies closer to the surface.  Along a
+pole a cell gives one: each has a vertex of its own there, at the u (or v) of its middle, so that texture coordinates
+interpolate as they should.
+Distances are taken between exact points, sampled in each cell, and the facet at the same parameters: `distance` is
+measured perpendicular to the facet, and on open sides perpendicular to the edge (what an eye or a ray sees); `slide` is
+the whole vector, with what a texture moves inside the surface.
 """
 
 from dataclasses import dataclass
@@ -13,7 +14,7 @@ import numpy as np
 
 from lib.nurbs.evaluate import evaluate_grid
 
-STEPS = 4  # samples per cell and direction
+STEPS = 4  # samples per cell and direction; quarters, because the middle of a coarse wave may lie on its chord
 FLAT = 1e-12  # a triangle of less area than this share of its longest edge squared has none
 
 
@@ -22,7 +23,8 @@ class Patch:
     """Triangles of one surface; geometric normals point along S_u x S_v.
 
     S (k, 3), UV (k, 2)  vertices and their parameters; F (m, 3) int64
-    side : four int arrays, the vertices along u=0, u=1, v=0, v=1 with the parameter ascending; a pole's side holds its vertices
+    side : four int arrays, the vertices along u=0, u=1, v=0, v=1 with the parameter ascending; a pole's side holds
+    its vertices
     distance : largest distance [unit of the surface]; square : its mean square, weighted by area; slide : largest slide
     area : of the triangles
     """
@@ -37,29 +39,33 @@ class Patch:
     area: float
 
 
-def _finer(lines):
-    """The lines with STEPS - 1 equal steps put between."""
-    t = np.arange(STEPS) / STEPS
+def _finer(lines, steps):
+    """The lines with steps - 1 equal steps put between."""
+    t = np.arange(steps) / steps
     return np.append((lines[:-1, None] + np.diff(lines)[:, None] * t).ravel(), lines[-1])
 
 
-def triangulate(surface, u, v, is_closed, is_collapsed):
-    """Cut a surface along its lines u, v (ascending, 0 and 1 among them); is_closed (2,), is_collapsed (4,)."""
-    fine = evaluate_grid(surface, _finer(u), _finer(v))[0]
-    S = fine[::STEPS, ::STEPS]
-    cells = _cells(fine, len(v) - 1, len(u) - 1)
+def triangulate(surface, u, v, is_closed, is_collapsed, steps=STEPS):
+    """Cut a surface along its lines u, v (ascending, 0 and 1 among them).
+
+    is_closed (2,), is_collapsed (4,) as lib.nurbs.shape says; steps: samples per cell and direction, even.
+    """
+    fine = evaluate_grid(surface, _finer(u, steps), _finer(v, steps))[0]
+    S = fine[::steps, ::steps]
+    cells = _cells(fine, steps)
     corner = (S[:-1, :-1], S[:-1, 1:], S[1:, 1:], S[1:, :-1])  # 00, 10, 11, 01
-    is_falling = _diagonal(corner, cells[..., STEPS // 2, STEPS // 2, :])
+    is_falling = _diagonal(corner, cells[..., steps // 2, steps // 2, :])
     distance, square, slide, area = _distances(cells, corner, is_falling, is_collapsed)
-    side_distance = max([_side_distance(fine, k) for k in range(4) if not (is_closed[k // 2] or is_collapsed[k])], default=0.0)
+    open_sides = [k for k in range(4) if not (is_closed[k // 2] or is_collapsed[k])]
+    side_distance = max([_side_distance(fine, k, steps) for k in open_sides], default=0.0)
     points, parameters, F, side = _mesh(S, u, v, is_falling, is_collapsed)
     return Patch(points, parameters, F, side, max(distance, side_distance), square, slide, area)
 
 
-def _cells(fine, n_v, n_u):
-    """Samples by cell, borders included: (n_v, n_u, 5, 5, 3), [.., v, u, :]."""
-    window = np.lib.stride_tricks.sliding_window_view(fine, (STEPS + 1, STEPS + 1), axis=(0, 1))
-    return np.moveaxis(window[::STEPS, ::STEPS], 2, -1)[:n_v, :n_u]
+def _cells(fine, steps):
+    """Samples by cell, borders included: (n_v, n_u, steps + 1, steps + 1, 3), [.., v, u, :]."""
+    window = np.lib.stride_tricks.sliding_window_view(fine, (steps + 1, steps + 1), axis=(0, 1))
+    return np.moveaxis(window[::steps, ::steps], 2, -1)
 
 
 def _diagonal(corner, middle):
@@ -73,26 +79,27 @@ def _diagonal(corner, middle):
 def _distances(cells, corner, is_falling, is_collapsed):
     """(largest distance, mean square, largest slide, area) of the cells' samples to their triangles."""
     S00, S10, S11, S01 = corner
-    a = np.arange(STEPS + 1) / STEPS
-    x, y = np.meshgrid(a, a)  # u and v inside the cell
+    x, y = np.meshgrid(*2 * [np.linspace(0.0, 1.0, cells.shape[2])])  # u and v inside the cell
     flip = is_falling[..., None]
     # as if every diagonal rose: mirrored cells swap their left and right corners
-    A, B, C, D = np.where(flip, S10, S00), np.where(flip, S00, S10), np.where(flip, S01, S11), np.where(flip, S11, S01)
+    A, B = np.where(flip, S10, S00), np.where(flip, S00, S10)
+    C, D = np.where(flip, S01, S11), np.where(flip, S11, S01)
     samples = np.where(is_falling[..., None, None, None], cells[..., ::-1, :], cells)
     weights = np.stack([1 - np.maximum(x, y), np.maximum(x - y, 0), np.minimum(x, y), np.maximum(y - x, 0)], axis=-1)
     facet = np.einsum("vuk,jick->jivuc", weights, np.stack([A, B, C, D], axis=-1))
     off = samples - facet
-    below, area_below = _normals(A, B, C)
-    above, area_above = _normals(A, C, D)
+    below, area_below = normals(A, B, C)
+    above, area_above = normals(A, C, D)
     _along_poles(below, area_below, above, area_above, is_collapsed)
-    height = np.where(x > y, np.abs(np.einsum("jivuc,jic->jivu", off, below)), np.abs(np.einsum("jivuc,jic->jivu", off, above)))
+    height = np.where(x > y, np.einsum("jivuc,jic->jivu", off, below), np.einsum("jivuc,jic->jivu", off, above))
     cell_area = area_below + area_above
     total = max(float(cell_area.sum()), 1e-300)
     square = float((cell_area * (height**2).mean(axis=(2, 3))).sum()) / total
-    return float(height.max()), square, float(np.linalg.norm(off, axis=-1).max()), float(cell_area.sum())
+    return float(np.abs(height).max()), square, float(np.linalg.norm(off, axis=-1).max()), float(cell_area.sum())
 
 
-def _normals(A, B, C):
+def normals(A, B, C):
+    """Unit normals (..., 3), zero where there is no area, and areas (...) of triangles."""
     cross = np.cross(B - A, C - A)
     double = np.linalg.norm(cross, axis=-1)
     return cross / np.maximum(double, 1e-300)[..., None], double / 2
@@ -106,13 +113,13 @@ def _along_poles(below, area_below, above, area_above, is_collapsed):
             below[cells] = above[cells] = np.where(larger, below[cells], above[cells])
 
 
-def _side_distance(fine, k):
+def _side_distance(fine, k, steps):
     """Largest distance of side k's samples from its edges."""
     line = (fine[:, 0], fine[:, -1], fine[0], fine[-1])[k]
-    start, along = line[:-1:STEPS], np.diff(line[::STEPS], axis=0)
+    start, along = line[:-1:steps], np.diff(line[::steps], axis=0)
     length = np.linalg.norm(along, axis=1, keepdims=True)
     along = np.where(length > 0, along / np.maximum(length, 1e-300), 0.0)[:, None]
-    off = line[:-1].reshape(-1, STEPS, 3) - start[:, None]
+    off = line[:-1].reshape(-1, steps, 3) - start[:, None]
     off = off - np.einsum("ksc,ksc->ks", off, np.broadcast_to(along, off.shape))[..., None] * along
     return float(np.linalg.norm(off, axis=2).max())
 

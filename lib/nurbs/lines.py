@@ -1,15 +1,18 @@
-"""Where to cut a surface: the lines of a tensor triangulation, so many and so placed that facets stay within a tolerance.
+"""Where to cut a surface: the lines of a tensor triangulation, so many and so placed that facets keep a tolerance.
 
-A chord over a step h leaves a curve of second derivative K by K h^2 / 8, so steps proportional to K^-1/2 spread the error evenly
-(equidistribution), and n = integral of sqrt(K / 8) / sqrt(tolerance) steps are needed.  K comes from second differences of points at
-equal steps, never from knots or control points: the same shape gets the same lines however it is written.  Two parts are told apart:
+A chord over a step h leaves a curve of second derivative K by K h^2 / 8, so steps proportional to K^-1/2 spread the
+error evenly (equidistribution), and n = integral of sqrt(K / 8) / sqrt(tolerance) steps are needed.  K comes from
+second differences of points at equal steps, never from knots or control points: the same shape gets the same lines
+however it is written.  Two parts are told apart:
 
   normal      the part of S_uu that leaves the surface (on a side: that leaves the side's curve); it moves the geometry
-  tangential  the part inside the surface (uneven speed, poles); it only lets a texture slide, and gets its own, wider tolerance
+  tangential  the part inside the surface (uneven speed, poles); it only lets a texture slide, and gets its own, wider
+  tolerance
 
-The diagonal of a cell adds the twist S_uv h_u h_v / 4, shared between the two directions.  Both directions take half the tolerance,
-unless one is so straight that it leaves more to the other.  Directions linked by borders share one line set (`Links`).
-Lines also run along kinks, where the derivative jumps.  Parameters are rounded to 2^-24, so that rounding noise does not reach them.
+The diagonal of a cell adds the twist S_uv h_u h_v / 4, shared between the two directions.  Both directions take half
+the tolerance, unless one is so straight that it leaves more to the other.  Directions linked by borders share one
+line set (`Links`). Lines also run along kinks, where the derivative jumps.  Parameters are rounded to 2^-24, so that
+rounding noise does not reach them.
 """
 
 from dataclasses import dataclass
@@ -215,8 +218,16 @@ def plan(demands, link):
             square.append(part.T**2)
             width.append(np.diff(edge))
         total += edge.size - 1
-    return Plan(demands, link, bounds, np.array(first, dtype=np.int64), np.array(node, dtype=np.int64),
-                np.array(segment, dtype=np.int64), np.concatenate(square), np.concatenate(width))
+    return Plan(
+        demands,
+        link,
+        bounds,
+        np.array(first, dtype=np.int64),
+        np.array(node, dtype=np.int64),
+        np.array(segment, dtype=np.int64),
+        np.concatenate(square),
+        np.concatenate(width),
+    )
 
 
 def _bounds(demands, link, members, is_mirrored):
@@ -297,13 +308,18 @@ def place(p, tolerance, count):
 
 
 def _place(density, edge, count, is_mirrored):
-    """Lines of one set: `count` (k,) steps of equal integral of `density` (64,) between the `edge` parameters (k + 1,)."""
+    """Lines of one set: `count` (k,) steps of equal integral of `density` (64,) between the `edge` parameters."""
     density = density + max(0.05 * density.max(), 1e-30)  # never a step without end where the surface is straight
     if is_mirrored:
         density = (density + density[::-1]) / 2
     summed = _cumulative(density)
     at = np.interp(edge, ALONG, summed)
-    inner = [np.interp(a + (b - a) * np.arange(1, n) / n, summed, ALONG) for a, b, n in zip(at[:-1], at[1:], count, strict=True)]
-    lines = np.concatenate([np.concatenate([[start], np.rint(t * GRAIN) / GRAIN]) for start, t in zip(edge, inner, strict=False)])
+    inner = [
+        np.interp(a + (b - a) * np.arange(1, n) / n, summed, ALONG)
+        for a, b, n in zip(at[:-1], at[1:], count, strict=True)
+    ]
+    lines = np.concatenate(
+        [np.concatenate([[start], np.rint(t * GRAIN) / GRAIN]) for start, t in zip(edge, inner, strict=False)]
+    )
     lines = np.unique(np.append(lines, 1.0))
     return (lines + (1 - lines[::-1])) / 2 if is_mirrored else lines

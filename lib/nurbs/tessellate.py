@@ -1,7 +1,8 @@
 """The mesh of a whole scene: every surface cut along its lines, neighbours meeting without a crack.
 
-`shapes` finds once what surfaces are and how they touch; `mesh` cuts them for given tolerances.  Along borders of equal speed, along seams
-and at poles the vertices of all sides take the position of the first of them, bit by bit, so nothing can slip through.
+`shapes` finds once what surfaces are and how they touch; `mesh` cuts them for given tolerances.  Along borders of
+equal speed, along seams and at poles the vertices of all sides take the position of the first of them, bit by bit, so
+nothing can slip through.
 """
 
 from dataclasses import dataclass
@@ -12,11 +13,12 @@ from lib.nurbs import borders as find_borders
 from lib.nurbs import lines as find_lines
 from lib.nurbs import shape
 from lib.nurbs.evaluate import evaluate_grid
-from lib.nurbs.facets import has_area, triangulate
+from lib.nurbs.facets import STEPS, has_area, triangulate
 
 NINE = np.linspace(0.0, 1.0, 9)
 SLIDE = 0.01  # share of its size by which a texture may slide on a surface
 ROUNDS = 8  # of measuring and cutting finer
+MANY = 400  # a surface of so many cells is smooth inside them: edge and facet middles show the distance
 
 
 @dataclass(frozen=True)
@@ -41,7 +43,8 @@ class Mesh:
     """Triangles of n surfaces, packed surface after surface.
 
     V (n_v, 3), UV (n_v, 2), F (n_f, 3) int32; vertex_start, face_start (n + 1,) int64
-    distance (n,) largest distance to the surface, welding included; rms (n,) its root mean square; slide (n,); area (n,) of the facets
+    distance (n,) largest distance to the surface, welding included; rms (n,) its root mean square; slide (n,); area
+    (n,) of the facets
     side : per surface, four arrays of vertices along its sides
     """
 
@@ -77,13 +80,22 @@ def shapes(surfaces, takes_part):
     is_closed = np.array([shape.is_closed(s) for s in surfaces]).reshape(-1, 2)
     is_collapsed = np.array([shape.collapsed_sides(s) for s in surfaces]).reshape(-1, 4)
     border, shell = find_borders.find(surfaces, is_closed, is_collapsed, np.asarray(takes_part, dtype=bool))
-    return Shapes(np.array([shape.area(s) for s in surfaces]), np.array([shape.extent(s) for s in surfaces]).reshape(-1, 2),
-                  np.array([shape.is_planar(s) for s in surfaces]), is_closed, is_collapsed, border, shell)
+    return Shapes(
+        np.array([shape.area(s) for s in surfaces]),
+        np.array([shape.extent(s) for s in surfaces]).reshape(-1, 2),
+        np.array([shape.is_planar(s) for s in surfaces]),
+        is_closed,
+        is_collapsed,
+        border,
+        shell,
+    )
 
 
 def plan(surfaces, known):
     """Everything about where lines go that does not depend on a tolerance (lib.nurbs.lines.Plan)."""
-    demands = [find_lines.demand(s, c, p) for s, c, p in zip(surfaces, known.is_closed, known.is_collapsed, strict=True)]
+    demands = [
+        find_lines.demand(s, c, p) for s, c, p in zip(surfaces, known.is_closed, known.is_collapsed, strict=True)
+    ]
     return find_lines.plan(demands, find_lines.links(len(surfaces), known.borders))
 
 
@@ -95,21 +107,28 @@ def n_triangles(p, known, count):
 
 
 def cut(surfaces, known, p, tolerance, slide):
-    """Cut all surfaces for tolerance (n,) and slide (n,), as planned and not yet measured against it: a list of Patch."""
+    """A list of Patch: all surfaces cut for tolerance (n,) and slide (n,) as planned, not measured against them."""
     both = np.stack([tolerance, slide], axis=1)
     placed = find_lines.place(p, both, find_lines.steps(p, both))
-    return [triangulate(*each) for each in zip(surfaces, *zip(*placed, strict=True), known.is_closed, known.is_collapsed, strict=True)]
+    return [
+        triangulate(*each)
+        for each in zip(surfaces, *zip(*placed, strict=True), known.is_closed, known.is_collapsed, strict=True)
+    ]
 
 
 def cut_within(surfaces, known, p, tolerance, slide):
-    """Cut all surfaces so that the measured distance stays within tolerance (n,): ask for more where it does not, and measure again."""
+    """A list of Patch: cut until the measured distance stays within tolerance (n,), asking for more where it does not.
+
+    Gives up after ROUNDS; the patches say what was reached.
+    """
     ask, patches, before = tolerance.copy(), [None] * len(surfaces), None
     for _ in range(ROUNDS):
         both = np.stack([ask, slide], axis=1)
         placed = find_lines.place(p, both, find_lines.steps(p, both))
         for s, (u, v) in enumerate(placed):
             if before is None or not (np.array_equal(u, before[s][0]) and np.array_equal(v, before[s][1])):
-                patches[s] = triangulate(surfaces[s], u, v, known.is_closed[s], known.is_collapsed[s])
+                steps = STEPS if len(u) * len(v) <= MANY else 2
+                patches[s] = triangulate(surfaces[s], u, v, known.is_closed[s], known.is_collapsed[s], steps)
         before = placed
         distance = np.array([p.distance for p in patches])
         over = (distance > tolerance) & ~(known.is_planar & (distance <= 1e-7))
@@ -128,9 +147,18 @@ def assemble(patches, known):
     F = [f[has_area(V, f)] for f in F]
     face_start = np.concatenate([[0], np.cumsum([len(f) for f in F])]).astype(np.int64)
     moved = np.maximum.reduceat(moved, vertex_start[:-1])
-    return Mesh(V, np.concatenate([p.UV for p in patches]), np.concatenate(F).astype(np.int32), vertex_start, face_start,
-                np.array([p.distance for p in patches]) + moved, np.sqrt([p.square for p in patches]),
-                np.array([p.slide for p in patches]), np.array([p.area for p in patches]), side)
+    return Mesh(
+        V,
+        np.concatenate([p.UV for p in patches]),
+        np.concatenate(F).astype(np.int32),
+        vertex_start,
+        face_start,
+        np.array([p.distance for p in patches]) + moved,
+        np.sqrt([p.square for p in patches]),
+        np.array([p.slide for p in patches]),
+        np.array([p.area for p in patches]),
+        side,
+    )
 
 
 def _weld(V, side, known):
