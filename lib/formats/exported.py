@@ -160,3 +160,32 @@ def _texture(document, buffers, path, texture):
         finally:
             os.unlink(name)
     return Texture(rgb, wrap)
+
+
+def inlined(path, largest=1 << 27):
+    """What the report's viewer needs of a .gltf: (document with its buffers as data URIs, {picture uri: data URI}).
+
+    The document's images keep their uri, so that levels which name the same picture get the same one.
+    Raises ArtefactError naming the file; returns None where buffers and pictures exceed `largest` bytes.
+    """
+    path = Path(path)
+    try:
+        document = json.loads(path.read_bytes())
+        total, pictures_found = 0, {}
+        for buffer in document.get("buffers", []):
+            data = _bytes(path, buffer["uri"])
+            total += len(data)
+            buffer["uri"] = "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+        for image in document.get("images", []):
+            if not image["uri"].startswith("data:"):
+                data = _bytes(path, image["uri"])
+                total += len(data)
+                kind = "jpeg" if data[:2] == b"\xff\xd8" else "png"
+                pictures_found[image["uri"]] = f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
+            if total > largest:
+                return None
+    except FileNotFoundError as error:
+        raise ArtefactError(f"{error.filename or path}: missing") from error
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise ArtefactError(f"{path}: not readable as glTF ({type(error).__name__}: {error})") from error
+    return document, pictures_found

@@ -24,9 +24,13 @@ POLICY = ("default-src 'none'; img-src data: blob:; style-src 'unsafe-inline'; s
 
 @dataclass(frozen=True)
 class Thumbnail:
-    """A surface's map as PNG bytes, and its cell borders as an SVG path over width x height cells."""
+    """A surface's map as PNG bytes, samples (w, h) in it, and its cell borders as an SVG path over width x height cells.
+
+    Samples lie on the crossings of cells, borders included, so the picture reaches half a sample over the border.
+    """
 
     png: bytes
+    samples: tuple
     path: str
     width: int
     height: int
@@ -256,7 +260,8 @@ def _light(figures):
     rows = [[escape(label), *(number(x, 5) for x in rgb), number(sum(rgb), 5), share(part, 3)]
             for label, rgb, part in figures["ledger"]]
     ledger = _table(["power [W]", "red", "green", "blue", "sum", "of emitted"], rows, "tnnnnn")
-    return _section("Light", chart + ledger, "Emitted = absorbed + escaped + unshot + quadrature residue.", "light")
+    return _section("Light", chart + ledger, "Emitted = not received + received; received = absorbed + escaped + unshot, to rounding; the residue is the "
+                    "reflected power of the gathered solution less that of the shot one.", "light")
 
 
 def _cost(figures):
@@ -288,8 +293,8 @@ def _surfaces(figures, pictures):
         lines = f'<path d="{thumb.path}"/>' if thumb.path else ""
         cards.append(
             f'<figure><svg viewBox="0 0 {thumb.width} {thumb.height}" preserveAspectRatio="none" '
-            f'style="aspect-ratio:{_aspect(thumb)}"><image href="{_data(thumb.png)}" width="{thumb.width}" '
-            f'height="{thumb.height}" preserveAspectRatio="none"/>{lines}</svg>'
+            f'style="aspect-ratio:{_aspect(s, thumb)}"><image href="{_data(thumb.png)}" {_box(thumb)} '
+            f'preserveAspectRatio="none"/>{lines}</svg>'
             f"<figcaption>{escape(s['name'])}<small>{_map_size(s)}</small></figcaption></figure>")
     gallery = ""
     if cards:
@@ -309,9 +314,15 @@ def _surfaces(figures, pictures):
                     "of the adaptive samples. The error is an estimate relative to the scene's mean light.", "maps")
 
 
-def _aspect(thumb):
-    return f"{max(0.25, min(4.0, thumb.width / thumb.height)):.3f}"
+def _aspect(s, thumb):
+    """Width over height of the drawn map: the surface's own mean extents where known."""
+    ratio = s.get("aspect") or thumb.width / thumb.height
+    return f"{max(0.4, min(3.0, ratio)):.3f}"
 
+
+def _box(thumb):
+    x, y = (0.5 * cells / max(n - 1, 1) for cells, n in zip((thumb.width, thumb.height), thumb.samples, strict=True))
+    return f'x="{-x:g}" y="{-y:g}" width="{thumb.width + 2 * x:g}" height="{thumb.height + 2 * y:g}"'
 
 def _map_size(s):
     return f"{s['map'][0]} \u00d7 {s['map'][1]}" if s["map"] else "\u2013"

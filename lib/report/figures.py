@@ -1,0 +1,129 @@
+"""The figures of report.json, from what the stages left behind: plain numbers in, plain dicts out."""
+
+import math
+
+STAGES = ["import_scene", "tessellate", "sample", "shoot", "refine", "refine direct", "refine indirect", "balance_resample",
+          "apply_base_texture", "budget_reduce", "lod_export", "package", "report"]
+SAVINGS = {
+    "cast_only": ("surfaces that only cast shadows: no elements, no map", "surfaces"),
+    "receive_only": ("surfaces that only receive: not in the shadow mesh", "surfaces"),
+    "black": ("black surfaces: no element row", "surfaces"),
+    "below_horizon": ("lights below the horizon or behind: no shadow ray", "pairs of sample and light"),
+    "dim": ("dim lights counted as unblocked", "pairs of sample and light"),
+    "agreed": ("lights whose first shadow rays agreed", "pairs of sample and light"),
+    "few_texels": ("maps that ended at their root grid", "maps"),
+    "levels_dropped": ("deepest levels dropped before writing, all within a quarter of the tolerance", "levels"),
+}
+
+
+def stage_costs(costs, run):
+    """One row a stage in the order of the pipeline: seconds, CPU seconds, rays summed over its jobs, the largest peak.
+
+    costs : dicts as the doors write them (stage, chunk, seconds, cpu_seconds, peak_mb, rays, run, notes)
+    run : id of the run that is reported; "" means that no job belongs to it
+    """
+    rows = {}
+    for c in costs:
+        row = rows.setdefault(c["stage"], {"stage": c["stage"], "jobs": 0, "seconds": 0.0, "cpu_seconds": 0.0,
+                                           "peak_mb": 0.0, "rays": 0, "rays_in_run": 0, "seconds_in_run": 0.0,
+                                           "jobs_in_run": 0})
+        is_in_run = bool(run) and c.get("run", "") == run
+        row["jobs"] += 1
+        for key in ("seconds", "cpu_seconds", "rays"):
+            row[key] += c[key]
+        row["peak_mb"] = max(row["peak_mb"], c["peak_mb"])
+        row["rays_in_run"] += c["rays"] * is_in_run
+        row["seconds_in_run"] += c["seconds"] * is_in_run
+        row["jobs_in_run"] += int(is_in_run)
+    order = {name: k for k, name in enumerate(STAGES)}
+    listed = sorted(rows.values(), key=lambda r: (order.get(r["stage"], len(STAGES)), r["stage"]))
+    for row in listed:
+        row["is_in_run"] = row["jobs_in_run"] > 0
+        for key in ("seconds", "cpu_seconds", "seconds_in_run"):
+            row[key] = round(row[key], 4)
+    return listed
+
+
+def notes(costs):
+    """Numbers the jobs noted, summed by name."""
+    total = {}
+    for c in costs:
+        for key, value in (c.get("notes") or {}).items():
+            if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+                total[key] = total.get(key, 0) + value
+    return total
+
+
+def savings(counted):
+    """Rows {what, count, unit} of what was not computed; counted : {name of SAVINGS or any other: number}."""
+    known = [{"what": what, "count": counted[key], "unit": unit} for key, (what, unit) in SAVINGS.items()
+             if counted.get(key)]
+    return known
+
+
+def ledger(powers):
+    """Rows (label, rgb, share of emitted) of the solver's powers, each (G, 3) or (3,), in a fixed order.
+
+    What is emitted and not received by any element is a row of its own: light that leaves the scene at once, light on
+    surfaces without elements, and the quadrature of direct light.
+    """
+    rgb = {}
+    for name, value in powers.items():
+        rows = value if len(value) and isinstance(value[0], list | tuple) else [value]
+        rgb[name] = [float(sum(r[c] for r in rows)) for c in range(3)]
+    if "emitted" in rgb and "received" in rgb:
+        rgb["not received"] = [e - r for e, r in zip(rgb["emitted"], rgb["received"], strict=True)]
+    base = next((sum(rgb[n]) for n in ("emitted", "received") if n in rgb and sum(rgb[n]) > 0), 0.0)
+    order = ["emitted", "not received", "received", "absorbed", "escaped", "unshot", "residue"]
+    names = [n for n in order if n in rgb] + sorted(n for n in rgb if n not in order)
+    labels = {"received": "received directly by elements", "residue": "quadrature residue: gathered less shot",
+              "not received": "not received: past all elements, and quadrature", "escaped": "escaped after a reflection"}
+    return [(labels.get(n, n.replace("_", " ")), rgb[n], sum(rgb[n]) / base if base else None) for n in names]
+
+
+def gouraud(leaves, levels):
+    """Triangles the same light would need as Gouraud-shaded elements (two a leaf), against the levels of detail.
+
+    leaves : number of quadtree leaves of each surface with a map; levels : rows with level and triangles of the same
+    surfaces (`mapped_triangles` where a level also draws surfaces without a map)
+    """
+    triangles = 2 * int(sum(leaves))
+    rows = []
+    for level in levels:
+        n = level.get("mapped_triangles", level["triangles"])
+        rows.append({"level": level["level"], "triangles": n, "times": triangles / n if n and triangles else None})
+    return {"triangles": triangles, "levels": rows}
+
+
+def budget_rows(table):
+    """Rows of the surfaces that gave something up, those that lost most bytes first, from budget.json."""
+    rows = []
+    for s in table["surfaces"]:
+        if s["level_after"] < s["level_before"]:
+            rows.append({"name": s["surface"], "from": "{} \u00d7 {}".format(*s["size_before"]),
+                         "to": "{} \u00d7 {}".format(*s["size_after"]), "levels": s["level_before"] - s["level_after"],
+                         "saved": s["bytes_before"] - s["bytes_after"], "D_i": s["D_given_up"]})
+    return sorted(rows, key=lambda r: (-r["saved"], r["name"]))
+
+
+def totals(stages, surfaces, levels, memory, unshot, error):
+    """The headline numbers."""
+    return {
+        "surfaces": len(surfaces),
+        "maps": sum(s["map"] is not None for s in surfaces),
+        "triangles": levels[0]["triangles"] if levels else None,
+        "texture_bytes": memory["after"],
+        "rays": sum(s["rays"] for s in stages),
+        "seconds": round(sum(s["seconds"] for s in stages), 3),
+        "cpu_seconds": round(sum(s["cpu_seconds"] for s in stages), 3),
+        "peak_mb": max((s["peak_mb"] for s in stages), default=0.0),
+        "error": error,
+        "unshot": unshot,
+    }
+
+
+def run_totals(stages, run):
+    """Rays, seconds and jobs of the run alone."""
+    return {"id": run, "rays": sum(s["rays_in_run"] for s in stages),
+            "seconds": round(sum(s["seconds_in_run"] for s in stages), 3),
+            "jobs": sum(s["jobs_in_run"] for s in stages)}

@@ -1,0 +1,54 @@
+"""How well the light of two maps agrees along a border their surfaces share.
+
+Conventions: maps [j, i] = [v row, u column]; sides 0 u=0, 1 u=1, 2 v=0, 3 v=1; a side runs with the free parameter, and
+`reversed` says that the neighbour's runs the other way.
+"""
+
+import numpy as np
+
+SMOOTH = np.cos(np.radians(10))  # neighbours whose normals differ less share light; over a sharper edge it may jump
+PROBES = 9  # points of a border at which normals are compared
+
+
+def line(value, hidden, side):
+    """The samples of one side in the order of its free parameter: (n, ...) values and (n,) hidden."""
+    part = {0: np.s_[:, 0], 1: np.s_[:, -1], 2: np.s_[0], 3: np.s_[-1]}[int(side)]
+    return value[part], hidden[part]
+
+
+def step(first, second, is_reversed):
+    """The largest difference between two lines (values (n, 3), hidden (n,)) over the same border.
+
+    Both are read at the crossings of the finer; a place one of whose samples is hidden is left out.
+    Returns a number >= 0, nan where nothing can be compared.
+    """
+    (a, a_hidden), (b, b_hidden) = first, second
+    if is_reversed:
+        b, b_hidden = b[::-1], b_hidden[::-1]
+    n = max(len(a), len(b))
+    (a, a_bad), (b, b_bad) = _read(a, a_hidden, n), _read(b, b_hidden, n)
+    seen = ~(a_bad | b_bad)
+    return float(np.abs(a - b)[seen].max()) if seen.any() else float("nan")
+
+
+def is_smooth(first, second):
+    """Do unit normals (n, 3) at the same places of a border agree within 10 degrees everywhere?"""
+    return bool((np.einsum("nx,nx->n", first, second) > SMOOTH).all())
+
+
+def border_uv(side, is_reversed=False, n=PROBES):
+    """Parameters u, v (n,) of places along a side, its ends left out."""
+    t = (np.arange(n) + 0.5) / n
+    t = t[::-1] if is_reversed else t
+    fixed = np.full(n, float(side in (1, 3)))
+    return (fixed, t) if side in (0, 1) else (t, fixed)
+
+
+def _read(value, hidden, n):
+    """A line read linearly at n even places, and where a hidden sample took part."""
+    value = np.asarray(value, float)
+    at = np.linspace(0, len(value) - 1, n)
+    low = np.minimum(at.astype(int), len(value) - 2)
+    part = (at - low)[:, None]
+    bad = (hidden[low] & (part[:, 0] < 1)) | (hidden[low + 1] & (part[:, 0] > 0))
+    return (1 - part) * value[low] + part * value[low + 1], bad
