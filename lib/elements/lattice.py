@@ -58,7 +58,7 @@ class Lattice:
         return own
 
     def copy_own(self, array):
-        """Copy samples to the crossings that repeat them, in place: seams first, then collapsed sides.  array (h, w, ...)."""
+        """Copy samples to the crossings that repeat them, in place: seams first, then collapsed sides; returns array (h, w, ...)."""
         if self.closed[0]:
             array[:, -1] = array[:, 0]
         if self.closed[1]:
@@ -66,6 +66,7 @@ class Lattice:
         for side, line in zip(self.collapsed, (array[:, 0], array[:, -1], array[0], array[-1]), strict=True):
             if side:
                 line[:] = line[:1].copy()
+        return array
 
 
 def receivers(surface, flip, lift, lattice, level, j, i):

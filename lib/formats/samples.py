@@ -1,0 +1,61 @@
+"""What `sample` measures for a chunk of surfaces: direct light on base lattices, and the elements with their rows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lib.formats import artefact
+
+KIND, VERSION = "samples", 1
+
+
+@dataclass(frozen=True)
+class Samples:
+    """One chunk.
+
+    surface (m,) int32 surfaces with maps, ascending; level, the base level of the direct trees
+    first (m + 1,) int64 offsets of their lattices in value (N, 3 G) float32 [W/m^2], hidden, penumbra (N,) bool
+    element (k,) int32 global numbers; entries (k, R) int32; is_hidden (k, 16) bool; area (k,) float64 visible area in frame units;
+    H_direct (k, G, 3) float64 [W/m^2]
+    """
+
+    surface: np.ndarray
+    level: int
+    first: np.ndarray
+    value: np.ndarray
+    hidden: np.ndarray
+    penumbra: np.ndarray
+    element: np.ndarray
+    entries: np.ndarray
+    is_hidden: np.ndarray
+    area: np.ndarray
+    H_direct: np.ndarray
+
+
+ARRAYS = [name for name in Samples.__dataclass_fields__ if name != "level"]
+
+
+def check(x):
+    """Raise ValueError naming the field that breaks the contract."""
+    if not np.isfinite(x.value).all() or (x.value < 0).any():
+        raise ValueError("samples: value: NaN, Inf or negative irradiance")
+    if len(x.first) != len(x.surface) + 1 or x.first[-1] != len(x.value):
+        raise ValueError("samples: first: offsets do not fit the values")
+    if not (len(x.element) == len(x.entries) == len(x.area) == len(x.H_direct) == len(x.is_hidden)):
+        raise ValueError("samples: element arrays of different length")
+    if not np.isfinite(x.H_direct).all():
+        raise ValueError("samples: H_direct: NaN or Inf")
+
+
+def save(path, x):
+    """Write a chunk."""
+    check(x)
+    artefact.write(path, KIND, VERSION, {"level": x.level}, {name: getattr(x, name) for name in ARRAYS})
+
+
+def load(path):
+    """Read a chunk; ArtefactError when it is damaged."""
+    header, arrays = artefact.read(path, KIND, VERSION)
+    x = Samples(level=header["level"], **arrays)
+    check(x)
+    return x

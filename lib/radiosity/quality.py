@@ -1,0 +1,59 @@
+"""From the tolerance asked to what the stages do: rays, elements, thresholds, levels.
+
+Model: the relative RMS error of a map is the root of the sum of squares of
+
+    gather         0.6 % (256 / K)^0.8
+    lookups        0.5 % (1600 / n_elements)^0.3
+    direct light   0.5 % (64 / n1)^0.5
+    interpolation  0.4 % (t / 0.025)
+
+as measured against path traced references.
+"""
+
+from dataclasses import asdict, dataclass
+
+
+@dataclass(frozen=True)
+class Quality:
+    """n_elements in the scene and rays_per_element for their rows; gather_rays K; shadow_rays (n0, n1);
+    thresholds t_direct, t_indirect in units of the scene's mean irradiance; levels of the two trees (base, top)."""
+
+    n_elements: int
+    rays_per_element: int
+    gather_rays: int
+    shadow_rays: tuple
+    t_direct: float
+    t_indirect: float
+    base_direct: int
+    base_indirect: int
+    top: int
+
+    def as_dict(self):
+        """Plain dict for JSON."""
+        return asdict(self)
+
+
+def quality(tolerance, max_level=6):
+    """Quality for a relative RMS error `tolerance` (0.002 .. 0.1) with trees at most `max_level` deep.
+
+    The number of elements changes in steps, so that most changes of the tolerance leave the solved elements as they are.
+    """
+    ratio = tolerance / 0.01
+    elements = 1600 if tolerance >= 0.0075 else 4000 if tolerance >= 0.004 else 10000
+    rays = _multiple_of_16(256 * ratio**-1.25, 32, 4096)
+    n1 = 32 if tolerance >= 0.015 else 64 if tolerance >= 0.0075 else 256
+    return Quality(
+        n_elements=elements,
+        rays_per_element=256,
+        gather_rays=rays,
+        shadow_rays=(16, n1),
+        t_direct=0.025 * ratio,
+        t_indirect=0.05 * ratio,
+        base_direct=4,
+        base_indirect=3,
+        top=max_level,
+    )
+
+
+def _multiple_of_16(x, low, high):
+    return int(min(high, max(low, 16 * round(x / 16))))

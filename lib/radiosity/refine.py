@@ -1,0 +1,93 @@
+"""Refinement of all trees of a chunk together, level by level: every new sample of a level is measured in one batch."""
+
+import numpy as np
+
+from lib.elements.balance import parents
+from lib.elements.quadtree import Quadtree
+from lib.maps.resample import resample
+from lib.radiosity.gather import LookupTable, indirect_light, radiosity_map
+from lib.radiosity.sampling import direct_at, points_at
+
+SMOOTH = 0.25  # dividing a cell once more leaves a quarter of the departure of a smooth field
+
+
+def refine(world, trees, sample, seed, tau, top):
+    """Measure and divide until every leaf is within its threshold.
+
+    trees : {surface: Quadtree}, whose wanted() samples are missing; sample(points) -> value (n, C), hidden (n,), noise (n,)
+    tau : {surface: threshold [W/m^2]}; top : deepest level.  Works on the trees in place.
+    """
+    active = sorted(s for s in trees if len(trees[s].wanted()[0]) or trees[s].split(tau[s], top))
+    while active:
+        wanted = {s: trees[s].wanted() for s in active}
+        points = points_at(world, seed, wanted, {s: trees[s].level for s in active})
+        value, hidden, noise = sample(points)
+        first = 0
+        for s in active:
+            part = slice(first, first + len(wanted[s][0]))
+            first = part.stop
+            trees[s].put(value[part], hidden[part], noise[part])
+        active = [s for s in active if trees[s].split(tau[s], top)]
+
+
+def refine_direct(world, base, seed, tau, top, level, shadow_rays):
+    """Direct trees from their base lattices.
+
+    base : {surface: (value (h, w, C), hidden, penumbra)} on `level`.  Returns {surface: Quadtree} and counts of spared rays.
+    """
+    trees, spared = {}, np.zeros(3, dtype=np.int64)
+    for s, (value, hidden, _) in base.items():
+        trees[s] = Quadtree(world.lattices[s], level, world.channels)
+        own = trees[s].wanted()
+        trees[s].put(value[own], hidden[own], np.zeros(len(own[0]), dtype=np.float32))
+
+    def sample(points):
+        light, buried = direct_at(world, points, shadow_rays)
+        spared[:] += light.below_horizon, light.dim, light.agreed
+        return light.H.reshape(len(buried), -1), buried, np.zeros(len(buried), dtype=np.float32)
+
+    refine(world, trees, sample, seed, tau, top)
+    return trees, spared
+
+
+def refine_indirect(world, surfaces, table, seed, tau, top, level, K):
+    """Indirect trees of `surfaces`, by K gather rays a sample through the LookupTable: {surface: Quadtree}."""
+    trees = {s: Quadtree(world.lattices[s], level, world.channels) for s in surfaces}
+
+    def sample(points):
+        light = indirect_light(points.x, points.N, points.shift, K, world.tracer, world.mesh, table, world.channels)
+        return light.H, light.hidden, light.noise
+
+    refine(world, trees, sample, f"{seed} indirect", tau, top)
+    return trees
+
+
+def lookup_table(world, direct, solution):
+    """Radiosity maps of every surface that reflects.
+
+    direct : {surface: (value (h, w, G, 3), known, hidden)} direct trees on their lattices
+    solution : has H_indirect (n, G, 3), share (n,), n_u, n_v, first, rho (surfaces, 3)
+    """
+    maps = {}
+    for s in np.flatnonzero(world.reflects & (solution.n_u > 0)):
+        value, hidden = resample(*direct[s])
+        part = slice(solution.first[s], solution.first[s + 1])
+        grid = int(solution.n_u[s]), int(solution.n_v[s])
+        closed = world.lattices[s].closed
+        maps[int(s)] = radiosity_map(value, hidden, solution.H_indirect[part], solution.share[part], grid, solution.rho[s], closed)
+    return LookupTable(maps, world.mesh, world.n, world.channels)
+
+
+def error_of(tree):
+    """Estimated RMS error of a tree's map [W/m^2]: sampling noise, and what the leaves still depart from their prediction."""
+    seen = tree.known & ~tree.hidden
+    noise = float(np.sqrt((tree.noise[seen].astype(np.float64) ** 2).mean())) if seen.any() else 0.0
+    departure, cells = 0.0, 0
+    for level in range(max(tree.base - 1, 0), tree.level):
+        last = tree.divided[level] if level + 1 >= len(tree.divided) else tree.divided[level] & ~parents(tree.divided[level + 1])
+        size = 4.0 ** (tree.level - level)
+        departure += float((tree.residual(level)[last].astype(np.float64) ** 2).sum()) * size
+        cells += last.sum() * size
+    interpolation = SMOOTH * np.sqrt(departure / cells) if cells else 0.0
+    return float(np.hypot(noise, interpolation))
+

@@ -1,0 +1,130 @@
+"""First samples of a chunk of surfaces: direct light on the base lattices, and the elements with their rows."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lib.elements.grids import by_element, point_parameters
+from lib.elements.lattice import OFFSET, receivers
+from lib.maps.fill import one_deep
+from lib.nurbs.evaluate import evaluate_grid, frame_grid
+from lib.radiosity.direct import direct_light
+from lib.radiosity.rows import Rows, element_rows
+from lib.radiosity.world import FINEST
+from lib.visibility.hemisphere import cosine_directions
+from lib.visibility.hidden import is_hidden
+from lib.visibility.qmc import r2, shift, stream
+
+HIDDEN_RAYS = 16  # decide for a sample without light of its own
+
+
+@dataclass(frozen=True)
+class Points:
+    """Samples of several surfaces in one batch: surface (n,), x, N (n, 3) lifted, shift (n, 2)."""
+
+    surface: np.ndarray
+    x: np.ndarray
+    N: np.ndarray
+    shift: np.ndarray
+
+
+def points_at(world, seed, wanted, level_of):
+    """Lattice crossings as ray origins.
+
+    wanted : {surface: (j, i)}; level_of : {surface: level of the lattice they count on}.  In the order of the dict.
+    """
+    parts = []
+    for s, (j, i) in wanted.items():
+        x, N = receivers(world.surface(s), world.scene.flip[s], world.casters.sag[s], world.lattices[s], level_of[s], j, i)
+        up = 2 ** (FINEST - level_of[s])
+        parts.append((np.full(len(j), s), x, N, shift(stream(seed, world.scene.names[s]), i * up, j * up)))
+    return Points(*(np.concatenate(field) for field in zip(*parts, strict=True)))
+
+
+def direct_at(world, points, shadow_rays):
+    """Direct light at points: DirectLight, and which are hidden (only those that no light reaches can be)."""
+    light = direct_light(
+        points.x, points.N, points.shift, world.emitters, world.n_groups, world.tracer, world.mesh.face_surface, *shadow_rays
+    )
+    hidden = np.zeros(len(points.x), dtype=bool)
+    dark = np.flatnonzero(light.H.max(axis=(1, 2), initial=0.0) <= 0)
+    if dark.size:
+        hidden[dark] = hidden_at(world, points.x[dark], points.N[dark], points.shift[dark])
+    return light, hidden
+
+
+def hidden_at(world, x, N, shifts):
+    """(n,) bool: the points are buried, judged by 16 rays each."""
+    out = np.zeros(len(x), dtype=bool)
+    sequence = r2(HIDDEN_RAYS)
+    for first in range(0, len(x), 1024):
+        part = slice(first, first + 1024)
+        D = cosine_directions(N[part], sequence, shifts[part])
+        hits = world.tracer.closest(np.repeat(x[part].astype(np.float32), HIDDEN_RAYS, axis=0), D.reshape(-1, 3))
+        shape = (len(x[part]), HIDDEN_RAYS)
+        out[part] = is_hidden(hits.is_back.reshape(shape), world.mesh.is_shell(hits.face).reshape(shape))
+    return out
+
+
+def base_lattice(world, surfaces, seed, level, shadow_rays):
+    """Direct light on the base lattices: {surface: (value (h, w, 3 G), hidden, penumbra (h, w))} and DirectLight's counts."""
+    wanted = {s: np.nonzero(world.lattices[s].is_own(level)) for s in surfaces}
+    if not wanted:
+        return {}, (0, 0, 0)
+    points = points_at(world, seed, wanted, dict.fromkeys(surfaces, level))
+    light, hidden = direct_at(world, points, shadow_rays)
+    out, first = {}, 0
+    for s, (j, i) in wanted.items():
+        part = slice(first, first + len(j))
+        first += len(j)
+        shape = world.lattices[s].shape(level)
+        value = np.zeros((*shape, world.channels), dtype=np.float32)
+        shade, penumbra = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
+        value[j, i], shade[j, i], penumbra[j, i] = light.H[part].reshape(len(j), -1), hidden[part], light.is_penumbra[part]
+        out[s] = tuple(world.lattices[s].copy_own(array) for array in (value, shade, penumbra))
+    return out, (light.below_horizon, light.dim, light.agreed)
+
+
+@dataclass(frozen=True)
+class Elements:
+    """Elements of one surface: rows, visible area (k,), mean direct light over visible points H_direct (k, 3 G)."""
+
+    rows: Rows
+    area: np.ndarray
+    H_direct: np.ndarray
+
+
+def surface_elements(world, s, seed, grids, R, base):
+    """Elements of surface s: their points, rows and direct light.
+
+    base : (value, hidden, _) of the surface's base lattice; R rays per element, 0 casts none (one bounce).
+    """
+    n_u, n_v = int(grids.n_u[s]), int(grids.n_v[s])
+    surface = world.surface(s)
+    u, v = point_parameters(n_u, n_v)
+    S, N = frame_grid(surface, u, v)
+    N = -N if world.scene.flip[s] else N
+    _, S_u, S_v = evaluate_grid(surface, u, v)
+    density = by_element(np.linalg.norm(np.cross(S_u, S_v), axis=2))
+    x = by_element(S + N * (world.casters.sag[s] + OFFSET))
+    number = np.arange(n_u * n_v)
+    shifts = shift(stream(f"{seed} rows", world.scene.names[s]), number % n_u, number // n_u)
+    if R:
+        rows = element_rows(x, by_element(N), shifts, R, world.tracer, world.mesh, grids)
+    else:
+        rows = Rows(np.full((len(x), 1), -1, dtype=np.int32), np.zeros(density.shape, dtype=bool))
+    visible = ~rows.is_hidden
+    area = (density * visible).mean(axis=1) / (n_u * n_v)
+    value, hidden, _ = base
+    light = by_element(_bilinear(one_deep(value, hidden, world.lattices[s].closed), u, v))
+    count = np.maximum(visible.sum(axis=1), 1)[:, None]
+    return Elements(rows, area, (light * visible[..., None]).sum(axis=1) / count)
+
+
+def _bilinear(value, u, v):
+    """Lattice values (h, w, C) on the tensor grid u, v: (len v, len u, C)."""
+    h, w = value.shape[:2]
+    i, j = np.minimum((u * (w - 1)).astype(int), w - 2), np.minimum((v * (h - 1)).astype(int), h - 2)
+    fu, fv = (u * (w - 1) - i)[None, :, None], (v * (h - 1) - j)[:, None, None]
+    rows = value[j] * (1 - fv) + value[j + 1] * fv
+    return rows[:, i] * (1 - fu) + rows[:, i + 1] * fu

@@ -1,0 +1,73 @@
+"""A scene ready for light: surfaces in the scene's frame, their lattices, emitters, and the tracer over the caster mesh."""
+
+from functools import cached_property
+
+import numpy as np
+
+from lib.elements.chunks import assign
+from lib.elements.grids import element_grids
+from lib.elements.lattice import Lattice, roots_of
+from lib.nurbs.shape import transformed
+from lib.radiosity.emitters import gather_emitters
+from lib.visibility.mesh_lookup import MeshLookup
+from lib.visibility.tracer import Tracer
+
+FINEST = 10  # lattice positions are hashed on this level's lattice: a crossing draws the same rays at whatever level it is met
+
+
+class World:
+    """What sample and refine need of a scene.
+
+    scene : has names, surfaces (world units), flip, role, E, group, groups, is_black, tolerance
+    casters : has centre, scale, V, F, UV, face_surface, sag, area, extent, is_planar, is_closed, is_collapsed, shell
+    """
+
+    def __init__(self, scene, casters):
+        self.scene, self.casters = scene, casters
+        self.n = len(scene.names)
+        self.n_groups = len(scene.groups)
+        self.channels = 3 * self.n_groups
+        role = np.array(scene.role)
+        self.has_map = (role != "cast_only") & ~np.asarray(scene.is_black)
+        self.reflects = (role == "full") & ~np.asarray(scene.is_black)
+        self.lattices = [
+            Lattice(roots_of(casters.extent[s]), tuple(casters.is_closed[s]), tuple(casters.is_collapsed[s]))
+            for s in range(self.n)
+        ]
+        self._frame = np.eye(4) / casters.scale
+        self._frame[:3, 3] = -np.asarray(casters.centre) / casters.scale
+        self._frame[3, 3] = 1.0
+
+    def surface(self, s):
+        """Surface s in the scene's frame."""
+        return transformed(self.scene.surfaces[s], self._frame)
+
+    @cached_property
+    def emitters(self):
+        """All emitters, in the scene's frame; cast_only ones shine too."""
+        lit = np.asarray(self.scene.E).max(axis=1, initial=0.0) > 0
+        surfaces = [self.surface(s) if lit[s] else None for s in range(self.n)]
+        return gather_emitters(surfaces, self.scene.flip, self.scene.E, self.scene.group)
+
+    @cached_property
+    def tracer(self):
+        """Rays against the caster mesh."""
+        return Tracer(self.casters.V, self.casters.F)
+
+    @cached_property
+    def mesh(self):
+        """What its faces mean."""
+        c = self.casters
+        return MeshLookup(c.F, c.UV, c.face_surface, c.shell)
+
+    def grids(self, n_elements):
+        """Element grids of the scene."""
+        c = self.casters
+        return element_grids(c.area, c.extent, c.is_planar, self.reflects, n_elements)
+
+    def chunk_of(self, n_chunks):
+        """Chunk of each surface: by the crossings of its base lattice, and by its area, where the light's detail is."""
+        area = self.casters.area / max(self.casters.area.sum(), 1e-300)
+        crossings = np.array([np.prod(lattice.shape(4)) for lattice in self.lattices], dtype=np.float64)
+        work = np.where(self.has_map, crossings / max(crossings.sum(), 1.0) + area, 0.0)
+        return assign(work, n_chunks)

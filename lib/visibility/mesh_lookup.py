@@ -1,0 +1,46 @@
+"""What a hit on the caster mesh means: which surface, where in its (u, v), which element, which texel."""
+
+import numpy as np
+
+
+class MeshLookup:
+    """Per-face tables over the caster mesh.
+
+    face_surface (m,) int; UV (n_v, 2); F (m, 3); shell (n,) int, -1 where the surface belongs to no closed shell.
+    """
+
+    def __init__(self, F, UV, face_surface, shell):
+        self.face_surface = np.asarray(face_surface)
+        corners = np.asarray(UV, dtype=np.float64)[np.asarray(F)]
+        self._uv = np.stack([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1)
+        self._is_shell = np.append((np.asarray(shell) >= 0)[self.face_surface], False)
+
+    def is_shell(self, face):
+        """(n,) bool: the face belongs to a closed shell; False for -1."""
+        return self._is_shell[face]
+
+    def element_of(self, hits, grids):
+        """Element number of each hit (n,) int32; -1 where nothing was met, -2 on back faces and surfaces without elements."""
+        met = hits.face >= 0
+        face = np.where(met, hits.face, 0)
+        if not len(self.face_surface):
+            return np.full(len(face), -1, dtype=np.int32)
+        surface = self.face_surface[face]
+        corners = self._uv[face]
+        uv = corners[:, 0] + hits.a[:, None] * corners[:, 1] + hits.b[:, None] * corners[:, 2]
+        n_u, n_v = grids.n_u[surface], grids.n_v[surface]
+        i = np.clip((uv[:, 0] * n_u).astype(np.int64), 0, np.maximum(n_u - 1, 0))
+        j = np.clip((uv[:, 1] * n_v).astype(np.int64), 0, np.maximum(n_v - 1, 0))
+        element = grids.first[surface] + j * n_u + i
+        element = np.where(hits.is_back | (n_u == 0), -2, element)
+        return np.where(met, element, -1).astype(np.int32)
+
+    def texel_coordinates(self, width, height):
+        """Faces in texel units of their surface's map: (m + 1, 6) float32 rows s, t, ds_a, dt_a, ds_b, dt_b; the last is zero.
+
+        width, height (n,) texels of each surface's map.
+        """
+        scale = np.stack([width - 1, height - 1], axis=1)[self.face_surface]
+        table = np.zeros((len(self.face_surface) + 1, 6), dtype=np.float32)
+        table[:-1] = (self._uv * scale[:, None]).reshape(-1, 6)
+        return table

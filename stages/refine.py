@@ -1,0 +1,81 @@
+"""Refine the light of a chunk of surfaces on adaptive quadtrees: the direct half, or the indirect half, which reads all direct trees.
+
+reads   scene.npz, casters.npz, solution.npz, and chunk_<c>.npz of sample (direct) or all direct_<c>.npz (indirect)
+writes  direct_<c>.npz or indirect_<c>.npz          (lib.formats.trees)
+
+settings: seed, tolerance, relative_to, t_direct, t_indirect, base_indirect, top, gather_rays, shadow_rays, bounces
+"""
+
+import json
+
+import numpy as np
+
+from lib import door
+from lib.formats import casters, samples, scene, solution, trees
+from lib.radiosity.refine import error_of, lookup_table, refine_direct, refine_indirect
+from lib.radiosity.thresholds import thresholds
+from lib.radiosity.world import World
+
+
+def arguments(parser):
+    """Name the stage's files and settings."""
+    for name in ("scene", "casters", "solution", "out"):
+        parser.add_argument(f"--{name}", required=True, metavar="FILE")
+    parser.add_argument("--half", choices=("direct", "indirect"), required=True)
+    parser.add_argument("--samples", metavar="FILE", help="chunk of sample (direct half)")
+    parser.add_argument("--direct", nargs="*", default=[], metavar="FILE", help="all direct trees (indirect half)")
+    parser.add_argument("--chunk", type=int, required=True)
+    parser.add_argument("--chunks", type=int, required=True)
+    parser.add_argument("--settings", type=json.loads, required=True, metavar="JSON")
+
+
+def body(args, cost):
+    """Load, refine, save."""
+    world = World(scene.load(args.scene), casters.load(args.casters))
+    solved, chosen = solution.load(args.solution), args.settings
+    tau = thresholds(solved, world.scene.tolerance, args.half, chosen)
+    if args.half == "direct":
+        x = samples.load(args.samples)
+        done, spared = refine_direct(
+            world, unpacked(x, world), chosen["seed"], tau, chosen["top"], x.level, chosen["shadow_rays"]
+        )
+        cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))
+    elif chosen["bounces"] == 1:
+        done = {}
+    else:
+        direct = {s: t.dense() for path in args.direct for s, t in trees.load(path, "direct")[0].items()}
+        mine = np.flatnonzero((world.chunk_of(args.chunks) == args.chunk) & world.has_map)
+        table = lookup_table(world, direct, solved)
+        done = refine_indirect(
+            world, mine, table, chosen["seed"], tau, chosen["top"], chosen["base_indirect"], chosen["gather_rays"]
+        )
+    trees.save(args.out, args.half, {int(s): stored(t, world.n_groups) for s, t in done.items()}, cost.notes)
+    cost.rays = world.tracer.rays
+
+
+def unpacked(x, world):
+    """{surface: (value, hidden, penumbra)} on the base lattices of a chunk of sample."""
+    out = {}
+    for k, s in enumerate(x.surface):
+        part, shape = slice(x.first[k], x.first[k + 1]), world.lattices[s].shape(x.level)
+        out[int(s)] = x.value[part].reshape(*shape, -1), x.hidden[part].reshape(shape), x.penumbra[part].reshape(shape)
+    return out
+
+
+def stored(tree, groups):
+    """The tree as its file holds it."""
+    at = np.nonzero(tree.known)
+    ji = np.stack(at, axis=1).astype(np.int32)
+    value = tree.value[at].reshape(-1, groups, 3)
+    return trees.Tree(
+        tree.lattice.roots, tree.level, ji, value, tree.hidden[at], tree.noise[at], tree.leaves(), error_of(tree)
+    )
+
+
+def main(argv=None):
+    """Run the stage; returns its exit status."""
+    return door.run(__doc__, arguments, body, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,71 @@
+"""Sample a chunk of surfaces: direct light on uniform uv crossings, and the elements with their form factor rows.
+
+reads   scene.npz, casters.npz                  (lib.formats.scene, .casters)
+writes  chunk_<c>.npz                           (lib.formats.samples)
+
+settings: seed, n_elements, rays_per_element, shadow_rays [n0, n1], base_direct, bounces
+"""
+
+import json
+
+import numpy as np
+
+from lib import door
+from lib.formats import casters, samples, scene
+from lib.radiosity.sampling import base_lattice, surface_elements
+from lib.radiosity.world import World
+
+
+def arguments(parser):
+    """Name the stage's files and settings."""
+    for name in ("scene", "casters", "out"):
+        parser.add_argument(f"--{name}", required=True, metavar="FILE")
+    parser.add_argument("--chunk", type=int, required=True)
+    parser.add_argument("--chunks", type=int, required=True)
+    parser.add_argument("--settings", type=json.loads, required=True, metavar="JSON")
+
+
+def body(args, cost):
+    """Load, sample, save."""
+    world = World(scene.load(args.scene), casters.load(args.casters))
+    chosen = args.settings
+    grids = world.grids(chosen["n_elements"])
+    mine = np.flatnonzero((world.chunk_of(args.chunks) == args.chunk) & world.has_map)
+    level, seed = chosen["base_direct"], chosen["seed"]
+    base, spared = base_lattice(world, mine, seed, level, chosen["shadow_rays"])
+    rays = 0 if chosen["bounces"] == 1 else chosen["rays_per_element"]
+    lit = [s for s in mine if grids.n_u[s]]
+    elements = [surface_elements(world, s, seed, grids, rays, base[s]) for s in lit]
+    samples.save(args.out, packed(mine, level, base, lit, elements, grids, world.n_groups))
+    cost.rays = world.tracer.rays
+    cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))
+    cost.notes["hidden_points"] = int(sum(e.rows.is_hidden.sum() for e in elements))
+
+
+def packed(surfaces, level, base, lit, elements, grids, groups):
+    """Samples from per-surface pieces."""
+    lattices = [base[s] for s in surfaces]
+    fields = [np.concatenate([np.zeros((0, *a[0].shape[2:]), a[0].dtype), *(x.reshape(-1, *x.shape[2:]) for x in a)])
+              for a in zip(*lattices, strict=True)] or [np.zeros((0, 3 * groups), np.float32), np.zeros(0, bool), np.zeros(0, bool)]
+    rows = [e.rows for e in elements]
+    width = rows[0].entries.shape[1] if rows else 1
+    return samples.Samples(
+        np.asarray(surfaces, dtype=np.int32),
+        level,
+        np.cumsum([0, *(x[1].size for x in lattices)]),
+        *fields,
+        np.concatenate([np.zeros(0, np.int32), *(np.arange(grids.first[s], grids.first[s + 1], dtype=np.int32) for s in lit)]),
+        np.concatenate([np.zeros((0, width), np.int32), *(r.entries for r in rows)]),
+        np.concatenate([np.zeros((0, 16), bool), *(r.is_hidden for r in rows)]),
+        np.concatenate([np.zeros(0), *(e.area for e in elements)]),
+        np.concatenate([np.zeros((0, groups, 3)), *(e.H_direct.reshape(-1, groups, 3) for e in elements)]),
+    )
+
+
+def main(argv=None):
+    """Run the stage; returns its exit status."""
+    return door.run(__doc__, arguments, body, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,81 @@
+"""Solve the bounced light of the elements: progressive refinement, then gather sweeps over the same rows.  Casts no ray.
+
+reads   scene.npz, casters.npz, chunk_<c>.npz of sample, the reflectances        (lib.formats.scene, .casters, .samples)
+writes  solution.npz                                                             (lib.formats.solution)
+
+settings: n_elements, convergence, bounces ("converge" or n)
+"""
+
+import json
+
+import numpy as np
+
+from lib import door
+from lib.elements.grids import element_grids
+from lib.formats import artefact, casters, samples, scene, solution
+from lib.radiosity.shooting import DoesNotConverge, FormFactors, solve
+from lib.refusal import Refusal
+
+
+def arguments(parser):
+    """Name the stage's files and settings."""
+    for name in ("scene", "casters", "materials", "out"):
+        parser.add_argument(f"--{name}", required=True, metavar="FILE")
+    parser.add_argument("--samples", nargs="+", required=True, metavar="FILE")
+    parser.add_argument("--settings", type=json.loads, required=True, metavar="JSON")
+
+
+def body(args, cost):
+    """Load, solve, save."""
+    x, mesh = scene.load(args.scene), casters.load(args.casters)
+    chosen = args.settings
+    reflectance = artefact.read_json(args.materials)["rho_avg"]
+    rho = np.array([reflectance.get(name, (0.0, 0.0, 0.0)) for name in x.names], dtype=np.float64).reshape(-1, 3)
+    reflects = (np.array(x.role) == "full") & ~np.asarray(x.is_black)
+    grids = element_grids(mesh.area, mesh.extent, mesh.is_planar, reflects, chosen["n_elements"])
+    chunks = [samples.load(path) for path in args.samples]
+    entries, share, area, H_direct = collected(chunks, grids.total, len(x.groups))
+    surface = np.repeat(np.arange(len(x.names)), grids.n_u * grids.n_v)
+    bounces = None if chosen["bounces"] == "converge" else int(chosen["bounces"])
+    try:
+        found = solve(H_direct, rho[surface], area, FormFactors(entries), chosen["convergence"], bounces)
+    except DoesNotConverge as error:
+        raise Refusal(f"the light does not converge: {error}; lower the reflectances or set bounces to a number") from None
+    watts = mesh.scale**2
+    total = max(area.sum(), 1e-300)
+    weighted = found.H.sum(axis=1) * area[:, None]
+    by_surface = np.stack([np.bincount(surface, w, minlength=len(x.names)) for w in weighted.T], axis=1)
+    H_surface = by_surface / np.maximum(np.bincount(surface, area, minlength=len(x.names)), 1e-300)[:, None]
+    mean_H = weighted.sum(axis=0) / total
+    emitted = [(x.E[x.group == g] * mesh.area[x.group == g, None]).sum(axis=0) * watts for g in range(len(x.groups))]
+    ledger = {name: (power * watts).tolist() for name, power in found.ledger.items()}
+    ledger["emitted"] = [power.tolist() for power in emitted]
+    facts = {"shots": found.shots, "sweeps": found.sweeps, "elements": grids.total, "ambient": found.ambient.tolist()}
+    solution.save(
+        args.out,
+        solution.Solution(
+            np.maximum(found.H - H_direct, 0).astype(np.float32),
+            share.astype(np.float32), grids.n_u, grids.n_v, rho, mean_H, H_surface, found.history, ledger, facts,
+        ),
+    )
+
+
+def collected(chunks, total, groups):
+    """Entries (n, R), visible share (n,), visible area (n,) and direct light (n, G, 3) of all elements, in order."""
+    width = max((c.entries.shape[1] for c in chunks if len(c.entries)), default=1)
+    entries, share = np.full((total, width), -3, dtype=np.int32), np.zeros(total)
+    area, H_direct = np.zeros(total), np.zeros((total, groups, 3))
+    for c in chunks:
+        if len(c.element):
+            entries[c.element], share[c.element] = c.entries, (~c.is_hidden).mean(axis=1)
+            area[c.element], H_direct[c.element] = c.area, c.H_direct
+    return entries, share, area, H_direct
+
+
+def main(argv=None):
+    """Run the stage; returns its exit status."""
+    return door.run(__doc__, arguments, body, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
