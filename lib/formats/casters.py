@@ -11,7 +11,7 @@ KIND, VERSION = "casters", 1
 
 @dataclass(frozen=True)
 class Casters:
-    """Triangles and shapes of n surfaces in the frame x' = (x - centre) / scale: its box is centred, its largest side 1.
+    """Triangles and shapes of n surfaces in the frame x' = (x - centre) / scale: box centred, its largest side 1.
 
     centre (3,) float64 [m], scale float > 0 [m]
     V (n_v, 3) float64, UV (n_v, 2) float64 surface parameters in [0, 1]

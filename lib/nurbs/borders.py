@@ -102,13 +102,13 @@ def same_curve(data, usable, known):
     keep = []
     for i, j in pair:
         far = max(
-            _to_polyline(data.points[i, ::FINE], data.points[j]), _to_polyline(data.points[j, ::FINE], data.points[i])
+            to_polyline(data.points[i, ::FINE], data.points[j]), to_polyline(data.points[j, ::FINE], data.points[i])
         )
         keep.append(far <= SAME_CURVE * min(data.length[i], data.length[j]))
     return pair[np.array(keep, dtype=bool)]
 
 
-def _to_polyline(points, line):
+def to_polyline(points, line):
     """The largest distance of `points` (m, 3) from the polyline `line` (k, 3)."""
     start, along = line[:-1], np.diff(line, axis=0)
     square = np.maximum(np.einsum("kc,kc->k", along, along), 1e-300)

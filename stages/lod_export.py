@@ -1,0 +1,100 @@
+"""Cut one level of detail of the whole scene from the exact surfaces, and measure how far it is from them.
+
+reads   scene.npz, casters.npz                                     (lib.formats.scene, .casters)
+        levels: JSON list, finest first, of {"deviation": length}, {"triangles": n}, {"share": x} or a bare share
+writes  lod_<k>.npz                                                (lib.formats.lod_mesh)
+
+A length is a number in the scene's unit, text like "0.5 mm", or "0.01 %" of the scene's largest side.  A share is one
+of the first level's triangles, or of a level of 0.01 % deviation where the first is a share itself.
+"""
+
+import json
+
+import numpy as np
+
+from lib import door
+from lib.formats import casters, lod_mesh, scene
+from lib.formats.quantities import METRES, metres
+from lib.lod.levels import DEVIATION, Scene, TooFine
+from lib.nurbs import tessellate
+from lib.refusal import refusal
+
+
+def arguments(parser):
+    parser.add_argument("--scene", required=True, metavar="FILE", help="scene.npz")
+    parser.add_argument("--casters", required=True, metavar="FILE", help="casters.npz")
+    parser.add_argument("--levels", required=True, type=json.loads, metavar="JSON", help="all levels, finest first")
+    parser.add_argument("--level-index", required=True, type=int, metavar="K", help="which of them to cut, from 0")
+    parser.add_argument("--units", default="m", choices=sorted(METRES), help="of lengths without a unit (default m)")
+    parser.add_argument("--out", required=True, metavar="FILE", help="lod_<k>.npz")
+
+
+def body(args, cost):
+    x, shapes = scene.load(args.scene), casters.load(args.casters)
+    levels = [asked if isinstance(asked, dict) else {"share": asked} for asked in args.levels]
+    if not 0 <= args.level_index < len(levels):
+        raise refusal(f"{args.level_index}, allowed are 0 to {len(levels) - 1}", field="level-index")
+    surfaces = tessellate.into_frame(x.surfaces, shapes.centre, shapes.scale)
+    k, asked = args.level_index, levels[args.level_index]
+    try:
+        level = cut(Scene(surfaces, shapes), levels, k, args.units, shapes.scale)
+    except TooFine as error:
+        raise refusal(f"{json.dumps(asked)} {error}", field=f"lods[{k}]") from None
+    note = ""
+    if level.is_smallest:
+        note = f"{level.asked} triangles asked for, these surfaces need {len(level.mesh.F)}"
+        door.warn(f"lods[{k}]: {note}")
+    lod_mesh.save(args.out, in_metres(level, shapes, np.asarray(x.flip, dtype=bool), k, asked, note))
+    cost.notes.update(level=k, triangles=len(level.mesh.F), distance=float(level.mesh.distance.max()) * shapes.scale)
+
+
+def cut(pieces, levels, k, units, scale):
+    """The Level `levels[k]` of the Scene `pieces`, whose frame is `scale` metres."""
+    asked = levels[k]
+    if "deviation" in asked:
+        return pieces.by_deviation(_deviation(asked, units, scale))
+    if "triangles" in asked:
+        return pieces.by_count(int(asked["triangles"]))
+    first = {"deviation": "0.01 %"} if "share" in levels[0] else levels[0]
+    finest = pieces.by_deviation(DEVIATION) if first is not levels[0] else cut(pieces, levels, 0, units, scale)
+    if asked["share"] == 1:
+        return finest
+    return pieces.by_count(int(asked["share"] * len(finest.mesh.F)))
+
+
+def _deviation(asked, units, scale):
+    length = metres(asked["deviation"], units, scale)
+    if not length > 0:
+        raise refusal(f"{asked['deviation']}, allowed are lengths > 0", field="lods: deviation")
+    return length / scale
+
+
+def in_metres(level, shapes, flip, k, asked, note):
+    """The LodMesh of a Level: out of the frame, turned where the surface is."""
+    mesh, scale = level.mesh, shapes.scale
+    turned_vertex = np.repeat(flip, np.diff(mesh.vertex_start))
+    turned_face = np.repeat(flip, np.diff(mesh.face_start))
+    return lod_mesh.LodMesh(
+        V=shapes.centre + scale * mesh.V,
+        N=np.where(turned_vertex[:, None], -level.N, level.N).astype(np.float32),
+        UV=mesh.UV,
+        F=np.where(turned_face[:, None], mesh.F[:, ::-1], mesh.F),
+        vertex_start=mesh.vertex_start,
+        face_start=mesh.face_start,
+        distance=mesh.distance * scale,
+        rms=mesh.rms * scale,
+        slide=mesh.slide * scale,
+        level=k,
+        asked=asked,
+        tolerance=level.tolerance * scale,
+        gap=level.gap * scale,
+        note=note,
+    )
+
+
+def main(argv=None):
+    return door.run(__doc__, arguments, body, argv)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
