@@ -8,7 +8,7 @@ Round things are surfaces of revolution about z: exact circles in u (rational qu
 example 7.2), a cubic through given points (r, z) in v (A9.1 with end slopes).  The profile starts below on the axis and is walked so that
 S_u x S_v points out of the solid.  First and last column are the same numbers, a pole is one point: closed things are exactly closed.
 The banana and the stems are sweeps: sections across an arc, their size tapering to a point at both ends.
-The duck is the point lists of duck1, duck2, duck3 (see LICENSES.md) with the knots of the program they belong to.
+The duck is the point lists of duck1, duck2, duck3 (see README.md) with the knots of the program they belong to.
 
 Each fruit stands on z = 0 about the origin and touches that plane with its lowest point; the duck keeps the coordinates of its files.
 """
@@ -239,7 +239,7 @@ def main():
     write("banana.json", banana())
     write("bowl.json", revolve(BOWL))
     write("globe.json", sphere(0.11))
-    write("cord.json", rod(0.004, 0.96))
+    write("cord.json", rod(0.004, 1.14))
     write("table_leg.json", rod(0.03, 0.705))
     write("duck.json", *duck())
 
