@@ -66,7 +66,7 @@ def body(args, cost):
         names=names,
         light=pack(maps.surface, maps.roots, maps.level, light, light_hidden),
         final=pack(maps.surface, maps.roots, final_level, final, final_hidden),
-        E=np.asarray(x.E, np.float64)[maps.surface],
+        E=(x.E * weights[x.group])[maps.surface],
         rho_avg=np.array([rho_avg[name] for name in names], np.float64).reshape(-1, 3),
         textured=np.array([name in textures for name in names], bool),
         pictures=used,

@@ -144,6 +144,8 @@ def _open(path):
 def _check_complete(path, file, size):
     """Refuse a PNG or JPEG whose end is missing or whose header asks for too much, by its marks alone."""
     head = file.read(24)
+    if head.startswith(b"version https://git-lfs"):
+        raise Refusal(f"{path}: is a Git LFS pointer, not the picture itself; fetch it with: git lfs pull")
     if head.startswith(b"\x89PNG\r\n\x1a\n"):
         if len(head) == 24:
             width, height = struct.unpack(">II", head[16:24])
