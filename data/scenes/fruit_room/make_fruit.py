@@ -4,13 +4,13 @@
 
 Needs numpy alone and writes the same bytes every time.  All lengths are metres, z is up.
 
-Round things are surfaces of revolution about z: exact circles in u (rational quadratics of nine points, The NURBS Book, A7.1 and
-example 7.2), a cubic through given points (r, z) in v (A9.1 with end slopes).  The profile starts below on the axis and is walked so that
-S_u x S_v points out of the solid.  First and last column are the same numbers, a pole is one point: closed things are exactly closed.
-The banana and the stems are sweeps: sections across an arc, their size tapering to a point at both ends.
-The duck is the point lists of duck1, duck2, duck3 (see README.md) with the knots of the program they belong to.
+Round things are surfaces of revolution about z: exact circles in u (rational quadratics of nine points, The NURBS Book,
+A7.1), a cubic through given points (r, z) in v (A9.1 with end slopes).  The profile starts below on the axis and is
+walked so that S_u x S_v points out of the solid.  First and last column are the same numbers, a pole is one point:
+closed things are exactly closed.  The banana and the stems are sweeps: sections across an arc, tapering to a point at
+both ends.  The duck is the point lists of duck1, duck2, duck3 with the knots of the program they belong to.
 
-Each fruit stands on z = 0 about the origin and touches that plane with its lowest point; the duck keeps the coordinates of its files.
+Each fruit touches z = 0 with its lowest point, near the origin; the duck keeps the coordinates of its files.
 """
 
 import json
@@ -27,19 +27,31 @@ CIRCLE_KNOTS = np.array([0, 0, 0, 0.25, 0.25, 0.5, 0.5, 0.75, 0.75, 1, 1, 1])
 
 
 # Profiles, in millimetres (r, z), from the lowest point of the axis to the last one.
-APPLE = [(0, 6), (7, 3.2), (15, 0), (25, 3.5), (34, 17), (37.5, 36), (34, 53), (24, 65), (14, 67.5), (5.5, 62), (0, 57.5)]
-PEAR = [(0, 4), (6, 2), (12, 0), (24, 5), (33, 20), (34.5, 34), (29, 52), (20.5, 68), (16, 82), (13.5, 93), (8, 99), (0, 100)]
+# fmt: off
+APPLE = [
+    (0, 6), (7, 3.2), (15, 0), (25, 3.5), (34, 17), (37.5, 36), (34, 53), (24, 65), (14, 67.5), (5.5, 62), (0, 57.5),
+]
+PEAR = [
+    (0, 4), (6, 2), (12, 0), (24, 5), (33, 20), (34.5, 34), (29, 52), (20.5, 68), (16, 82), (13.5, 93), (8, 99),
+    (0, 100),
+]
 BOWL = [
     (0, 4), (30, 3.6), (41, 2.4), (46, 0), (51, 2), (53, 6), (68, 12), (100, 31), (122, 58), (130, 78),
     (129.5, 82), (126, 82.5), (122.5, 77), (113, 57), (92, 34), (62, 16), (30, 9.5), (0, 8.5),
-]  # fmt: skip
+]
+# (degrees along the arc, radius of the section [mm])
+BANANA = [
+    (-58, 0), (-58, 3.6), (-56, 4.4), (-52, 4.6), (-47, 6), (-40, 12.5), (-28, 16.5), (-12, 17.2), (6, 17.2),
+    (22, 16.5), (34, 13.5), (42, 8.5), (46, 4.8), (48, 3.6), (48, 0),
+]
+# fmt: on
 
 
 def cubic_through(points):
     """A clamped cubic B-spline through points (m, d), level at both ends: knots (m + 6,), control points (m + 2, d).
 
-    Chord-length parameters, the interior knots at the parameters; the first and last control leg keep the height (last coordinate)
-    of the end they leave, so that a surface of revolution is smooth at its poles.
+    Chord-length parameters, the interior knots at the parameters; the first and last control leg keep the height
+    (last coordinate) of the end they leave, so that a surface of revolution is smooth at its poles.
     """
     points = np.asarray(points, dtype=float)
     m = len(points)
@@ -85,6 +97,7 @@ def revolve(profile, stand=True):
 
 def lowest(knots, z):
     """The least value of the cubic with control values z: sampled, then bisected to rounding."""
+
     def value(t):
         return float(np.dot([bspline(knots, 3, k, t) for k in range(len(z))], z))
 
@@ -98,7 +111,7 @@ def lowest(knots, z):
 
 
 def sphere(radius):
-    """The exact sphere about the origin: u round, v a half circle of two rational quadratics from the south pole to the north."""
+    """The exact sphere about the origin: u round, v a half circle of two rational quadratics from below."""
     r, z = radius * np.array([0, 1, 1, 1, 0.0]), radius * np.array([-1, -1, 0, 1, 1.0])
     weights = np.array([1, HALF, 1, HALF, 1])
     points = np.empty((9, 5, 3))
@@ -133,17 +146,14 @@ def sweep(centre, tangent, up, radius, section, section_knots, section_weights):
 
 def banana():
     """An arc of 105 degrees lying on its side, five soft edges, a stem at one end and a blunt tip at the other."""
-    # Five rational quadratics round: the exact circle has corner weights cos 36 = 0.809, heavier corners make soft edges.
+    # Five rational quadratics round: corner weights cos 36 = 0.809 would make a circle, heavier ones make soft edges.
     corner = np.deg2rad(18 + 36 * np.arange(11))
     reach = np.where(np.arange(11) % 2 == 1, 1 / np.cos(np.deg2rad(36)), 1.0)
     section = np.stack([reach * np.cos(corner), reach * np.sin(corner)], axis=1)
     section[-1] = section[0]
     weights = np.where(np.arange(11) % 2 == 1, 1.15, 1.0)
     knots = np.concatenate([[0, 0, 0], np.repeat([0.2, 0.4, 0.6, 0.8], 2), [1, 1, 1]])
-    # (degrees along the arc, radius of the section [mm])
-    rows = [(-58, 0), (-58, 3.6), (-56, 4.4), (-52, 4.6), (-47, 6), (-40, 12.5), (-28, 16.5), (-12, 17.2), (6, 17.2), (22, 16.5),
-            (34, 13.5), (42, 8.5), (46, 4.8), (48, 3.6), (48, 0)]  # fmt: skip
-    angle, radius = np.deg2rad([a for a, _ in rows]), np.array([r for _, r in rows]) / 1000
+    angle, radius = np.deg2rad([a for a, _ in BANANA]), np.array([r for _, r in BANANA]) / 1000
     arc = 0.098  # radius of the middle line
     zero = np.zeros_like(angle)
     centre = arc * np.stack([np.sin(angle), 1 - np.cos(angle), zero], axis=1)
@@ -176,7 +186,7 @@ def grid(shape, points, weights, n):
 
 
 def stem(foot, height, lean, radius):
-    """A bent stem about (0, 0, foot) [mm], leaning by lean at its upper end, a little thicker there; both ends closed."""
+    """A bent stem about (0, 0, foot) [mm], leaning by lean at its upper end, thicker there; both ends closed."""
     t = np.array([0, 0, 0.15, 0.4, 0.7, 0.93, 1, 1])
     taper = np.array([0, 1, 1, 0.9, 0.95, 1.25, 1.25, 0])
     zero = np.zeros_like(t)
@@ -228,8 +238,10 @@ def surface(degree_u, degree_v, knots_u, knots_v, points, weights=None):
 
 def write(name, *surfaces):
     """Write geomdl's JSON for one or more surfaces."""
-    text = json.dumps({"shape": {"type": "surface", "count": len(surfaces), "data": list(surfaces)}}, separators=(",", ":"))
-    (HERE / name).write_text(text.replace('],[', '],\n[').replace('{"type"', '\n{"type"') + "\n", encoding="utf-8")
+    text = json.dumps(
+        {"shape": {"type": "surface", "count": len(surfaces), "data": list(surfaces)}}, separators=(",", ":")
+    )
+    (HERE / name).write_text(text.replace("],[", "],\n[").replace('{"type"', '\n{"type"') + "\n", encoding="utf-8")
 
 
 def main():
