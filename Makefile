@@ -76,8 +76,8 @@ setup:  ## only create .venv from requirements.lock and check the system's libra
 	    "$$python" -m venv .venv
 	    pip() { .venv/bin/python -m pip --disable-pip-version-check --no-input "$$@"; }
 	    sed -n '/^setuptools==/,/^ *#/p' requirements.lock > .venv/build.lock
-	    pip install --quiet --no-compile --no-deps --require-hashes -r .venv/build.lock
-	    pip install --quiet --no-compile --no-deps --require-hashes --no-build-isolation -r requirements.lock
+	    pip install -qq --no-compile --no-deps --require-hashes -r .venv/build.lock
+	    pip install -qq --no-compile --no-deps --require-hashes --no-build-isolation --use-pep517 -r requirements.lock
 	    pip check > /dev/null || { pip check >&2; exit 1; }
 	    printf '%s\n' "$$wanted" > .venv/packages.stamp
 	fi
