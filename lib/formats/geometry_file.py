@@ -106,7 +106,7 @@ def read(path, file, name, only=None, trimmed="refuse"):
 
 
 def read_bytes(path, file, name, what="file"):
-    """The bytes of a file; Refusal if it is missing, not a file, empty or too large, which is checked before reading."""
+    """The bytes of a file; Refusal if it is missing, not a file, empty or too large (checked before reading)."""
     try:
         if not path.is_file():
             raise refusal("is not a file" if path.exists() else "no such file", file, name, what)

@@ -1,0 +1,129 @@
+"""scene.npz: the surfaces of a scene in world metres, and what each of them is for.
+
+Written by import_scene, read by all.  Reflectances are not in it: they reach the solver as parameters, so that a
+repainted texture of equal average changes nothing here.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lib.formats import artefact
+from lib.formats.artefact import ArtefactError
+from lib.nurbs.surface import NurbsSurface
+
+KIND, VERSION = "scene", 1
+ROLES = ("full", "cast_only", "receive_only")
+RECONSTRUCTIONS = ("texture", "gouraud", "auto")
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """n surfaces, ordered by name; the index counts from 0 and is the same in every later file.
+
+    names : n different texts, ascending
+    files : n file stems, safe in any file system, e.g. "003-teapot-12"
+    surfaces : n NurbsSurface, world metres
+    flip : (n,) bool, the lit side is against S_u x S_v
+    role : n of ROLES;  reconstruction : n of RECONSTRUCTIONS;  material : n texts
+    E : (n, 3) float64 exitance, linear RGB [W/m^2], >= 0
+    group : (n,) int32 index into groups, 0 for surfaces that emit nothing
+    groups : names of the light groups, at least one
+    is_black : (n,) bool, declared reflectance exactly 0 and no texture
+    tolerance : (n,) float64, refinement tolerance of the surface, NaN where the scene's holds
+    up : "y" or "z";  warnings : sentences for the user
+    """
+
+    names: list
+    files: list
+    surfaces: list
+    flip: np.ndarray
+    role: list
+    E: np.ndarray
+    group: np.ndarray
+    groups: list
+    is_black: np.ndarray
+    reconstruction: list
+    tolerance: np.ndarray
+    material: list
+    up: str
+    warnings: list
+
+
+def check(scene, where="scene"):
+    """Raise ArtefactError, naming the field, unless the scene is as Scene states."""
+    n = len(scene.names)
+
+    def demand(holds, field, expected):
+        if not holds:
+            raise ArtefactError(f"{where}: {field}: expected {expected}")
+
+    demand(n > 0 and list(scene.names) == sorted(set(scene.names)), "names", "at least one, different, ascending")
+    for field in ("files", "surfaces", "role", "reconstruction", "material"):
+        demand(len(getattr(scene, field)) == n, field, f"{n} entries")
+    demand(len(set(scene.files)) == n, "files", "different file stems")
+    demand(set(scene.role) <= set(ROLES), "role", " | ".join(ROLES))
+    demand(set(scene.reconstruction) <= set(RECONSTRUCTIONS), "reconstruction", " | ".join(RECONSTRUCTIONS))
+    for field, shape, dtype in (
+        ("flip", (n,), bool),
+        ("E", (n, 3), np.float64),
+        ("group", (n,), np.int32),
+        ("is_black", (n,), bool),
+        ("tolerance", (n,), np.float64),
+    ):
+        array = getattr(scene, field)
+        demand(array.shape == shape and array.dtype == dtype, field, f"{np.dtype(dtype).name} of shape {shape}")
+    demand(np.isfinite(scene.E).all() and (scene.E >= 0).all(), "E", "finite values >= 0")
+    n_groups = len(scene.groups)
+    demand(n_groups > 0 and 0 <= scene.group.min() and scene.group.max() < n_groups, "group", f"0 to {n_groups - 1}")
+    tolerance = scene.tolerance[~np.isnan(scene.tolerance)]
+    demand((tolerance > 0).all(), "tolerance", "NaN or a value > 0")
+    demand(scene.up in ("y", "z"), "up", "y or z")
+
+
+def save(path, scene):
+    """Write a Scene; the bytes depend on its content alone."""
+    check(scene, path)
+    S = scene.surfaces
+    header = {
+        "names": list(scene.names),
+        "files": list(scene.files),
+        "role": list(scene.role),
+        "groups": list(scene.groups),
+        "reconstruction": list(scene.reconstruction),
+        "material": list(scene.material),
+        "up": scene.up,
+        "warnings": list(scene.warnings),
+    }
+    arrays = {
+        "degree": np.array([(s.degree_u, s.degree_v) for s in S], dtype=np.int32),
+        "size": np.array([s.Pw.shape[:2] for s in S], dtype=np.int32),
+        "knots": np.concatenate([knots for s in S for knots in (s.knots_u, s.knots_v)]),
+        "Pw": np.concatenate([s.Pw.reshape(-1, 4) for s in S]),
+        **{field: getattr(scene, field) for field in ("flip", "E", "group", "is_black", "tolerance")},
+    }
+    artefact.write(path, KIND, VERSION, header, arrays)
+
+
+def load(path):
+    """Read a Scene; ArtefactError if the file is not one."""
+    header, arrays = artefact.read(path, KIND, VERSION)
+    try:
+        surfaces = _surfaces(arrays.pop("degree"), arrays.pop("size"), arrays.pop("knots"), arrays.pop("Pw"))
+        fields = ("names", "files", "role", "groups", "reconstruction", "material", "up", "warnings")
+        scene = Scene(surfaces=surfaces, **{field: header[field] for field in fields}, **arrays)
+    except (KeyError, TypeError, ValueError) as error:
+        raise ArtefactError(f"{path}: damaged ({error}); delete it to have it made again") from error
+    check(scene, path)
+    return scene
+
+
+def _surfaces(degree, size, knots, Pw):
+    """Cut the packed knots and control points into surfaces."""
+    surfaces, k, p = [], 0, 0
+    for (degree_u, degree_v), (n_u, n_v) in zip(degree.tolist(), size.tolist(), strict=True):
+        ends = np.cumsum([k, n_u + degree_u + 1, n_v + degree_v + 1])
+        net = Pw[p : p + n_u * n_v].reshape(n_u, n_v, 4)
+        surfaces.append(NurbsSurface(degree_u, degree_v, knots[ends[0] : ends[1]], knots[ends[1] : ends[2]], net))
+        k, p = ends[2], p + n_u * n_v
+    return surfaces

@@ -1,0 +1,140 @@
+"""The complete check of a scene folder: settings, geometry, materials, textures; what preflight keeps of it."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from lib.formats import (
+    geometry_file,
+    pictures,
+    scene,
+    scene_folder,
+    scene_geometry,
+    scene_import,
+    scene_rules,
+    scene_table,
+    settings,
+)
+from lib.formats.mistakes import Mistakes
+from lib.maps.base_texture import rho_average
+from lib.nurbs.tessellate import frame
+from lib.refusal import Refusal
+
+DIGITS = 4  # of an average reflectance: a repainted texture whose average moves less re-bakes nothing
+BRIGHT = 0.95  # reflectances above are allowed but rarely meant; shots grow as 1 / (1 - rho)
+LINEAR = (".exr", ".hdr")
+
+
+@dataclass(frozen=True)
+class Found:
+    """What preflight keeps.
+
+    file : scene.yaml as messages name it
+    outcome : fields of Preflight but folder, name and slices
+    slices : {kind: content};  inputs : {path: SHA-256}
+    """
+
+    file: str
+    outcome: dict
+    slices: dict
+    inputs: dict
+
+
+def run(folder, overrides=None):
+    """Check the scene in `folder` under `overrides` and return what was Found; Refusal lists what is wrong."""
+    source = scene_folder.read(folder, overrides)
+    scene_rules.check(source)
+    wanted = source.settings
+    placed, notes = scene_geometry.load(wanted["geometry"], wanted["units"], source.folder, source.file, source.where)
+    table = scene_table.resolve(wanted, placed, source.where)
+    made = scene_import.assemble(placed, notes, table, wanted["up"])
+    scene.check(made, source.file)
+    warnings = list(made.warnings)
+    textures, rho_avg = _reflectances(source, made, warnings)
+    digests = {name: geometry_file.digest(source.folder / name) for name in _geometry_files(wanted)}
+    pictures_used = {row["file"]: geometry_file.digest(row["file"]) for row in textures.values()}
+    area = {one.name: one.area for one in placed}
+    outcome = {
+        "settings": settings.resolve(wanted, float(frame(made.surfaces)[1])),
+        "names": made.names,
+        "files": made.files,
+        "roles": made.role,
+        "is_black": made.is_black.tolist(),
+        "area": [area[name] for name in made.names],
+        "groups": made.groups,
+        "textures": textures,
+        "rho_avg": rho_avg,
+        "geometry_files": [str(source.folder / name) for name in digests],
+        "texture_files": sorted(pictures_used),
+        "warnings": warnings,
+    }
+    slices = {
+        "geometry": scene_import.geometry_slice(wanted, table, digests),
+        "materials": {"rho_avg": rho_avg},
+        "textures": {
+            "textures": {name: {**row, "digest": pictures_used[row["file"]]} for name, row in textures.items()}
+        },
+    }
+    scene_file = source.folder / "scene.yaml"
+    inputs = {str(source.folder / name): digest for name, digest in digests.items()}
+    return Found(
+        source.file, outcome, slices, {**inputs, **pictures_used, str(scene_file): geometry_file.digest(scene_file)}
+    )
+
+
+def _geometry_files(wanted):
+    return sorted({entry["file"] for entry in wanted["geometry"] if "file" in entry})
+
+
+def _reflectances(source, made, warnings):
+    """Textures {surface: {file, colour_space, repeat}} and average reflectances {surface: [r, g, b]}."""
+    mistakes, textures, rho_avg, opened = Mistakes(), {}, {}, {}
+    materials = source.settings.get("materials", {})
+    for index, name in enumerate(made.names):
+        material = materials.get(made.material[index], {})
+        if "texture" not in material:
+            rho_avg[name] = scene_table.reflectance(material)
+            continue
+        row = {
+            "file": str(source.folder / material["texture"]),
+            "colour_space": material.get("colour_space", _colour_space(material["texture"])),
+            "repeat": [float(n) for n in material.get("repeat", [1, 1])],
+        }
+        key = (row["file"], row["colour_space"])
+        if key not in opened:
+            opened[key] = _picture(source, name, material["texture"], row, mistakes, warnings)
+        if opened[key] is not None:
+            textures[name] = row
+            rho = rho_average(made.surfaces[index], opened[key], tuple(row["repeat"]))
+            rho_avg[name] = [min(round(float(x), DIGITS), 1.0) for x in rho]
+    mistakes.stop()
+    _warn_bright(made, rho_avg, warnings)
+    return textures, rho_avg
+
+
+def _picture(source, name, written, row, mistakes, warnings):
+    """The picture in linear light, or None with the reason noted."""
+    shown, path = str(Path(source.file).parent / written), row["file"]
+
+    def warn(text):
+        warnings.append(text.replace(path, shown))
+
+    try:
+        return pictures.read_linear(path, row["colour_space"], warn)
+    except Refusal as error:
+        what = str(error).removeprefix(f"{path}: ")
+        mistakes.add(what, shown, name, "texture")
+        return None
+
+
+def _colour_space(texture):
+    return "linear" if Path(texture).suffix.lower() in LINEAR else "srgb"
+
+
+def _warn_bright(made, rho_avg, warnings):
+    bright = {}
+    for name, material in zip(made.names, made.material, strict=True):
+        if max(rho_avg[name]) > BRIGHT:
+            bright.setdefault(material, []).append(name)
+    for material, found in bright.items():
+        rest = f" and {len(found) - 1} more" if len(found) > 1 else ""
+        warnings.append(f"material {material}: reflectance above {BRIGHT} (surface {found[0]}{rest}) converges slowly")

@@ -1,0 +1,181 @@
+"""Geometry entries of a scene, inline or from files, as named NURBS surfaces in world metres."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from lib.formats import geometry_file, names, placement
+from lib.formats.mistakes import Mistakes
+from lib.formats.quantities import METRES
+from lib.formats.scene_rules import entry_name
+from lib.nurbs.shape import area, transformed
+from lib.nurbs.surface import NurbsSurface, bilinear, from_points
+from lib.refusal import Refusal, refusal
+
+FLAT = 1e-13  # area over squared size below which a surface is a line or a point: rounding of its coordinates
+
+
+@dataclass(frozen=True)
+class Placed:
+    """One surface of the scene.
+
+    name : its name;  object : name of the placed entry it belongs to;  entry : index of that entry
+    surface : NurbsSurface, world metres;  flip : the lit side is against S_u x S_v;  area : [m^2]
+    """
+
+    name: str
+    object: str
+    entry: int
+    surface: NurbsSurface
+    flip: bool
+    area: float
+
+
+def load(entries, units, folder, file, where=None):
+    """Read and place all geometry: (list of Placed in the entries' order, list of notes).
+
+    entries : geometry of scene.yaml;  units : the scene's unit
+    folder : where files lie;  file : scene.yaml as messages name it
+    where : function of a path of keys to (file, line), or None
+
+    Raises Refusal listing every mistake of all entries.
+    """
+    mistakes, notes, placed, contents = Mistakes(), [], [], {}
+    where = where or (lambda path: (file, None))
+    for index, entry in enumerate(entries):
+        try:
+            if "file" in entry:
+                key = (entry["file"], entry.get("only"), entry.get("trimmed", "refuse"))
+                if key not in contents:
+                    contents[key] = _read(entry, folder, file)
+                    notes += [f"{entry['file']}: {note}" for note in contents[key].notes]
+                parts, total = contents[key].patches, contents[key].total
+                unit = METRES[entry["units"]] if "units" in entry else contents[key].metres
+                if unit is None and entry["file"].lower().endswith(".3dm"):
+                    raise refusal("states no unit; say it with `units`", entry["file"], entry_name(entry), "units")
+                unit = METRES[units] if unit is None else unit
+            else:
+                parts, total, unit = [geometry_file.Patch(0, inline(entry))], 0, METRES[units]
+        except Refusal as error:
+            for line in str(error).splitlines():
+                mistakes.add_text(line)
+            continue
+        except ValueError as error:
+            field, _, what = str(error).partition(": ")
+            source, line = where(("geometry", index, *field.split("[")[0].split(".")))
+            mistakes.add(what, source, entry_name(entry), field, line)
+            continue
+        placed += _placed(entry, index, parts, total, unit / METRES[units], METRES[units], mistakes, where)
+    _check_names(placed, mistakes, where)
+    mistakes.stop()
+    return placed, notes
+
+
+def _read(entry, folder, file):
+    shown = str(Path(file).parent / entry["file"])
+    name, only, trimmed = entry_name(entry), entry.get("only"), entry.get("trimmed", "refuse")
+    return geometry_file.read(Path(folder) / entry["file"], shown, name, only, trimmed)
+
+
+def inline(entry):
+    """The NurbsSurface of an entry with rectangle, quadrangle, triangle or nurbs; ValueError `FIELD: what`."""
+    if "rectangle" in entry:
+        o, u, v = (np.array(entry["rectangle"][key], dtype=np.float64) for key in ("origin", "u", "v"))
+        return bilinear(o, o + u, o + u + v, o + v)
+    if "triangle" in entry:
+        a, b, c = entry["triangle"]
+        return bilinear(a, b, c, c)
+    if "quadrangle" in entry:
+        corners = np.array(entry["quadrangle"], dtype=np.float64)
+        _check_corners(corners)
+        return bilinear(*corners)
+    net = entry["nurbs"]
+    n_v = len(net["points"][0])
+    ragged = next((i for i, row in enumerate(net["points"]) if len(row) != n_v), None)
+    if ragged is not None:
+        raise ValueError(f"nurbs.points[{ragged}]: {len(net['points'][ragged])} points, the first row has {n_v}")
+    rows = net.get("weights")
+    if rows is not None and [len(row) for row in rows] != [n_v] * len(net["points"]):
+        raise ValueError(f"nurbs.weights: expected {len(net['points'])} rows of {n_v} weights, as the points")
+    knots = [
+        net.get(key) or _uniform(degree, n)
+        for key, degree, n in (("knots_u", net["degree_u"], len(net["points"])), ("knots_v", net["degree_v"], n_v))
+    ]
+    try:
+        return from_points(net["degree_u"], net["degree_v"], *knots, net["points"], rows)
+    except ValueError as error:
+        raise ValueError(f"nurbs.{error}") from None
+
+
+def _uniform(degree, n):
+    """Clamped knots with equal spans; too few points are left for NurbsSurface to name."""
+    return [0.0] * degree + list(np.linspace(0.0, 1.0, max(n - degree + 1, 2))) + [1.0] * degree
+
+
+def _check_corners(corners):
+    """ValueError if the corners of a quadrangle are concave or cross: it would fold over itself."""
+    ahead, back = np.roll(corners, -1, axis=0) - corners, np.roll(corners, 1, axis=0) - corners
+    N = np.cross(ahead, back)
+    size = np.abs(corners - corners[0]).max() ** 2
+    if (N @ N.sum(axis=0) < -1e-9 * size * size).any():
+        raise ValueError("quadrangle: the corners cross or are concave; expected a convex round trip of four corners")
+
+
+def _placed(entry, index, parts, total, to_scene, to_metres, mistakes, where):
+    """Every copy of an entry's patches, in world metres."""
+    places = entry.get("place", {})
+    places = places if isinstance(places, list) else [places]
+    result = []
+    for number, place in enumerate(places, 1):
+        name = names.copy(entry_name(entry), number, len(places))
+        try:
+            M = placement.matrix(place)
+        except ValueError as error:
+            field, _, what = str(error).partition(": ")
+            source, line = where(("geometry", index, "place"))
+            mistakes.add(what, source, name, field, line)
+            continue
+        M[:3, :3] *= to_scene * to_metres
+        M[:3, 3] *= to_metres
+        mirrored = np.linalg.slogdet(M[:3, :3])[0] < 0
+        for part in parts:
+            full = names.patch(name, part.number, total) if total else name
+            made = _world(part.surface, M, full, index, mistakes, where)
+            if made is not None:
+                flip = bool(part.flip) ^ bool(mirrored) ^ bool(entry.get("flip", False))
+                result.append(Placed(full, name, index, made[0], flip, made[1]))
+    return result
+
+
+def _world(surface, M, name, index, mistakes, where):
+    """(surface in metres, its area), or None with the reason noted."""
+    file, line = where(("geometry", index))
+    try:
+        surface = surface if np.array_equal(M, np.eye(4)) else transformed(surface, M)
+    except ValueError as error:
+        field, _, what = str(error).partition(": ")
+        mistakes.add(what, file, name, f"place ({field})", line)
+        return None
+    P = surface.P.reshape(-1, 3)
+    size = float(np.ptp(P, axis=0).max())
+    found = area(surface) if size > 0 else 0.0
+    rounding = 16 * np.finfo(np.float64).eps * float(np.abs(P).max()) * size
+    if not found > max(FLAT * size * size, rounding):
+        mistakes.add("the surface has no area (it is a line or a point)", file, name, line=line)
+        return None
+    return surface, found
+
+
+def _check_names(placed, mistakes, where):
+    first = {}
+    for one in placed:
+        file, line = where(("geometry", one.entry))
+        fault = names.complaint(one.name)
+        if fault:
+            mistakes.add(fault, file, one.name[:80], "name", line)
+        if one.name in first:
+            other = where(("geometry", first[one.name]))[1]
+            what = f"another surface has this name too (entry in line {other}); names are different"
+            mistakes.add(what, file, one.name, "name", line)
+        first.setdefault(one.name, one.entry)

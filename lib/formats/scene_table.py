@@ -1,0 +1,105 @@
+"""What each surface of a scene is for: role, material, light; patterns resolved, totals spread over exact areas."""
+
+import fnmatch
+import math
+
+from lib.formats.mistakes import Mistakes, listed, nearest
+from lib.formats.scene_rules import DEFAULT_MATERIAL
+
+REFLECTANCE = 0.7  # of a material that states neither a reflectance, a texture nor a light
+LUMENS_PER_WATT = 683.0  # of the green the eye sees best; luminance weights of linear Rec. 709
+LUMINANCE = (0.2126, 0.7152, 0.0722)
+MAIN_GROUP = "main"
+FIELDS = ("role", "reconstruction", "tolerance", "material")
+
+
+def resolve(settings, placed, where):
+    """Per surface name: role, reconstruction, tolerance (None: the scene's), turn, material, E, group, is_black.
+
+    settings : of a SceneFolder;  placed : list of scene_geometry.Placed;  where : function of a path to (file, line)
+
+    `turn` is the override's `flip`: it comes on top of what file, placement and entry say.
+    Raises Refusal for a pattern that matches no surface, and for a light too strong to be a number.
+    """
+    mistakes = Mistakes()
+    table = {one.name: _of_entry(settings["geometry"][one.entry]) for one in placed}
+    for pattern, override in settings.get("surfaces", {}).items():
+        hit = [name for name in table if name == pattern or fnmatch.fnmatchcase(name, pattern)]
+        if not hit:
+            file, line = where(("surfaces", pattern))
+            what = f"matches no surface{nearest(pattern, table) or '; there are ' + listed(table)}"
+            mistakes.add(what, file, field=f"surfaces.{pattern}", line=line)
+        for name in hit:
+            table[name].update({field: override[field] for field in FIELDS if field in override})
+            table[name]["turn"] = override.get("flip", table[name]["turn"])
+    mistakes.stop()
+    _light(settings, placed, table, where)
+    return table
+
+
+def _of_entry(entry):
+    return {
+        "role": entry.get("role", "full"),
+        "reconstruction": entry.get("reconstruction", "auto"),
+        "tolerance": entry.get("tolerance"),
+        "material": entry.get("material", DEFAULT_MATERIAL),
+        "turn": False,
+    }
+
+
+def _light(settings, placed, table, where):
+    """Add E, group and is_black to the rows: a total is spread over the surfaces of one placed object and material."""
+    mistakes, materials = Mistakes(), settings.get("materials", {})
+    total = {}
+    for one in placed:
+        key = (one.object, table[one.name]["material"])
+        total[key] = total.get(key, 0.0) + one.area
+    for one in placed:
+        row = table[one.name]
+        material = materials.get(row["material"], {})
+        row["E"] = exitance(material, total[one.object, row["material"]])
+        row["group"] = material.get("group", MAIN_GROUP)
+        row["is_black"] = "texture" not in material and reflectance(material) == [0.0, 0.0, 0.0]
+        if not all(math.isfinite(e) and e <= 1e30 for e in row["E"]):
+            file, line = where(("materials", row["material"]))
+            mistakes.add("its light is more than 1e30 W/m2", file, one.name, f"materials.{row['material']}", line)
+    mistakes.stop()
+
+
+def reflectance(material):
+    """Declared reflectance [r, g, b] of a material without texture; 0 if it only emits, REFLECTANCE if it says nothing.
+
+    >>> reflectance({"reflectance": 0.5}), reflectance({"power": 40})
+    ([0.5, 0.5, 0.5], [0.0, 0.0, 0.0])
+    """
+    emits = any(key in material for key in ("emission", "power", "lumens"))
+    return _rgb(material.get("reflectance", 0.0 if emits else REFLECTANCE))
+
+
+def exitance(material, area):
+    """Exitance E [r, g, b] in W/m2 of a material spread over `area` [m2].
+
+    `power` is the sum over the channels [W]; `lumens` counts 683 lm/W times the luminance of linear RGB.
+
+    >>> exitance({"power": 6, "colour": [1, 2, 0]}, 2.0)
+    [1.0, 2.0, 0.0]
+    >>> exitance({"lumens": 683, "colour": [1, 1, 1]}, 1.0)
+    [1.0, 1.0, 1.0]
+    """
+    if "emission" in material:
+        return _rgb(material["emission"])
+    colour = _rgb(material.get("colour", 1.0))
+    largest = max(colour)
+    colour = [c / largest for c in colour]
+    if "power" in material:
+        scale = material["power"] / (area * math.fsum(colour))
+    elif "lumens" in material:
+        luminance = math.fsum(weight * c for weight, c in zip(LUMINANCE, colour, strict=True))
+        scale = material["lumens"] / (area * LUMENS_PER_WATT * luminance)
+    else:
+        return [0.0, 0.0, 0.0]
+    return [scale * c for c in colour]
+
+
+def _rgb(value):
+    return [float(x) for x in value] if isinstance(value, list) else [float(value)] * 3
