@@ -36,8 +36,8 @@ def body(args, cost):
     parts, textures = exported.load(args.gltf)
     model = picture.join(parts)
     view = _camera(args.camera) or cameras.automatic(model)
-    image = picture.render(model, textures, view, width, height, args.samples, edges=args.edges)
-    cost.rays += width * height * args.samples**2
+    image = picture.render_with_edges(model, textures, view, width, height, args.samples, edges=args.edges)[1]
+    cost.notes["picture_rays"] = width * height * args.samples**2  # not rays of the bake
     pictures.write_png8(args.out, image)
 
 

@@ -29,7 +29,7 @@ from lib.nurbs.evaluate import normal
 from lib.report import camera as cameras
 from lib.report import charts, figures, picture, seams, surfaces, thumbnails
 
-HERO, SMALL = (960, 600), (480, 300)  # pixels
+HERO, SMALL = (960, 600), (400, 250)  # pixels
 MOST_THUMBNAILS = 160
 MOST_SEAMS = 20
 GIVEN = {  # option: pattern below the results folder, whether it is a list
@@ -220,15 +220,14 @@ def draw(found, facts, settings, cost):
         if view is None:
             view = scene_camera(given, settings) if given else cameras.automatic(model)
             hero = png(picture.render(model, loaded, view, *HERO))
-        shot = [png(picture.render(model, loaded, view, *SMALL, edges=edges)) for edges in (0.0, 0.6)]
-        levels.append(tuple(shot))
+        levels.append(tuple(png(shot) for shot in picture.render_with_edges(model, loaded, view, *SMALL)))
         inlined = exported.inlined(path)
         if inlined and documents is not None:
             documents.append(inlined[0])
             textures.update(inlined[1])
         else:
             documents = None
-        cost.notes["picture_rays"] = cost.notes.get("picture_rays", 0) + 8 * SMALL[0] * SMALL[1] + (k == 0) * 4 * HERO[0] * HERO[1]
+        cost.notes["picture_rays"] = cost.notes.get("picture_rays", 0) + 4 * SMALL[0] * SMALL[1] + (k == 0) * 4 * HERO[0] * HERO[1]
     shown = {"levels": documents, "textures": textures,
              "camera": {"eye": list(view.eye), "target": list(view.target), "fov": view.fov}} if documents else None
     return report_html.Pictures(hero, levels, map_thumbnails(found, facts)), shown

@@ -271,7 +271,7 @@ def _cost(figures):
     most = {key: max(max(s[key] for s in stages), 1e-12) for key in ("seconds", "rays")}
     rows = []
     for s in stages:
-        bars = [(f'<span class="bar"><i style="width:{100 * s[key] / most[key]:.1f}%"></i></span>{text}', s[key])
+        bars = [(f'<span class="bar"><i style="width:{100 * s[key] / most[key]:.1f}%"></i></span><span>{text}</span>', s[key])
                 for key, text in (("seconds", number(s["seconds"])), ("rays", count(s["rays"])))]
         rows.append([escape(str(s["stage"])), count(s["jobs"]), bars[0], number(s["cpu_seconds"]),
                      f"{number(s['peak_mb'])} MB", bars[1], "yes" if s["is_in_run"] else "kept"])
@@ -311,7 +311,7 @@ def _surfaces(figures, pictures):
     table = f"<details{' open' if len(rows) <= 40 else ''}><summary>{count(len(rows))} surfaces</summary>{table}</details>"
     return _section("Illumination maps", gallery + table,
                     "Reflected light of each surface over its own parameters, u to the right, v up. Lines are the cells "
-                    "of the adaptive samples. The error is an estimate relative to the scene's mean light.", "maps")
+                    "of the adaptive samples; violet samples are buried in a solid. The error is an estimate relative to the scene's mean light.", "maps")
 
 
 def _aspect(s, thumb):

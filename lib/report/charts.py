@@ -19,7 +19,7 @@ def convergence(shots, unshot, target=None):
     positive = [y for _, y in points if y > 0] + ([target] if target else [])
     if len(points) < 2 or not positive:
         return ""
-    low, high = math.floor(math.log10(min(positive))), math.ceil(math.log10(max(positive)) + 1e-9)
+    low, high = math.floor(math.log10(min(positive))), math.ceil(math.log10(max(positive)) - 1e-9)
     high = max(high, low + 1)
     width, height, left, right, top, foot = 640, 260, 58, 14, 12, 40
     x_end = max(x for x, _ in points) or 1.0

@@ -53,8 +53,9 @@ class Model:
 
     mesh: closest.Mesh
     face_part: np.ndarray  # (n_f,)
-    ST: np.ndarray  # (n_v, 2)
-    colour: np.ndarray  # (n_v, 3), vertex colour times factor
+    normal: np.ndarray  # (n_f, 3) geometric, any length
+    ST: np.ndarray  # (n_f, 3, 2) texture coordinates of the corners
+    colour: np.ndarray | None  # (n_f, 3, 3) vertex colours of the corners, None where no part has any
     parts: list = field(repr=False)
 
     @property
@@ -65,14 +66,16 @@ class Model:
 def join(parts):
     """Model of a list of Part."""
     starts = np.cumsum([0] + [len(p.V) for p in parts])
-    V = np.concatenate([np.asarray(p.V, float) for p in parts] + [np.zeros((0, 3))])
-    F = np.concatenate([np.asarray(p.F, int) + s for p, s in zip(parts, starts, strict=False)] + [np.zeros((0, 3), int)])
-    ST = np.concatenate([np.zeros((len(p.V), 2)) if p.ST is None else p.ST for p in parts] + [np.zeros((0, 2))])
-    colour = np.concatenate(
-        [np.broadcast_to((1.0 if p.colour is None else p.colour) * np.asarray(p.factor, float), (len(p.V), 3))
-         for p in parts] + [np.zeros((0, 3))])
+    V = np.concatenate([np.zeros((0, 3))] + [np.asarray(p.V, float) for p in parts])
+    F = np.concatenate([np.zeros((0, 3), int)] + [np.asarray(p.F, int) + s for p, s in zip(parts, starts, strict=False)])
+    ST = np.concatenate([np.zeros((0, 2))] + [np.zeros((len(p.V), 2)) if p.ST is None else p.ST for p in parts])
+    colour = None
+    if any(p.colour is not None for p in parts):
+        colour = np.concatenate([np.ones((len(p.V), 3)) if p.colour is None else p.colour for p in parts])[F]
     face_part = np.repeat(np.arange(len(parts)), [len(p.F) for p in parts])
-    return Model(closest.prepare(V, F), face_part, ST, colour, list(parts))
+    mesh, corner = closest.prepare(V, F), V[F]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    return Model(mesh, face_part, normal, ST[F], colour, list(parts))
 
 
 def first_visible(model, origin, direction):
@@ -82,12 +85,10 @@ def first_visible(model, origin, direction):
     """
     t, face, weight = closest.first_hits(model.mesh, origin, direction)
     two_sided = np.array([p.is_two_sided for p in model.parts] + [True])
-    corners = model.mesh.V[model.mesh.F]
-    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) if len(corners) else corners[:, 0]
     step = STEP * model.size / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)
     for _ in range(THROUGH):
         hit = np.flatnonzero(face >= 0)
-        behind = np.einsum("nx,nx->n", normal[face[hit]], direction[hit]) > 0
+        behind = np.einsum("nx,nx->n", model.normal.take(face[hit], 0), direction.take(hit, 0)) > 0
         again = hit[behind & ~two_sided[model.face_part[face[hit]]]]
         if not len(again):
             break
@@ -100,8 +101,13 @@ def first_visible(model, origin, direction):
     return t, face, weight
 
 
-def render(model, textures, camera, width, height, samples=2, background=BACKGROUND, edges=0.0):
-    """Draw a model.
+def render(model, textures, camera, width, height, samples=2, background=BACKGROUND):
+    """Draw a model: (height, width, 3) uint8, sRGB. Arguments as for `render_with_edges`."""
+    return render_with_edges(model, textures, camera, width, height, samples, background, 0.0)[0]
+
+
+def render_with_edges(model, textures, camera, width, height, samples=2, background=BACKGROUND, edges=0.6):
+    """Draw a model, and once more with its triangles.
 
     Parameters
     ----------
@@ -112,11 +118,11 @@ def render(model, textures, camera, width, height, samples=2, background=BACKGRO
         Rays a pixel are samples x samples.
     background : (3,) sRGB in [0, 1], where no face is seen.
     edges : float
-        Darkens the pixels in which two triangles meet by this share: 0 shows the picture, 0.5 the triangulation on it.
+        Share by which light is dimmed where two triangles meet, in the second picture.
 
     Returns
     -------
-    (height, width, 3) uint8, sRGB.
+    two pictures (height, width, 3) uint8, sRGB
     """
     w, h = width * samples, height * samples
     back = srgb_to_linear(np.asarray(background, float))
@@ -131,25 +137,38 @@ def render(model, textures, camera, width, height, samples=2, background=BACKGRO
         colour[face < 0] = back
         image[top:below] = colour.reshape(below - top, w, 3)
         seen[top:below] = face.reshape(below - top, w)
-    if edges:
-        image[_borders(seen)] *= 1 - edges
-    image = image.reshape(height, samples, width, samples, 3).mean((1, 3))
-    return np.rint(linear_to_srgb(image) * 255).astype(np.uint8)
+    plain = _developed(image, height, width, samples)
+    if not edges:
+        return plain, plain
+    image[_borders(seen)] *= 1 - edges
+    return plain, _developed(image, height, width, samples)
+
+
+def _developed(image, height, width, samples):
+    """8-bit sRGB of linear light, averaged over samples x samples."""
+    image = image.reshape(height, samples, width, samples, 3)
+    mean = sum(image[:, a, :, b] for a in range(samples) for b in range(samples)) / samples**2
+    return np.rint(linear_to_srgb(mean) * 255).astype(np.uint8)
 
 
 def shade(model, textures, face, weight):
-    """Linear colour (n, 3) of hits; black where face is -1."""
-    colour = np.zeros((len(face), 3))
-    hit = np.flatnonzero(face >= 0)
-    part = model.face_part[face[hit]]
-    corner = model.mesh.F[face[hit]]
-    colour[hit] = np.einsum("nk,nkc->nc", weight[hit], model.colour[corner])
-    st = np.einsum("nk,nkc->nc", weight[hit], model.ST[corner])
-    texture = np.array([p.texture for p in model.parts] + [-1])[part]
+    """Linear colour (n, 3) float32 of hits; black where face is -1."""
+    part = np.append(model.face_part, len(model.parts)).take(face)
+    factor = np.array([p.factor for p in model.parts] + [(0, 0, 0)], np.float32)
+    colour = factor.take(part, 0)
+    if model.colour is not None:
+        colour *= _interpolated(model.colour, np.maximum(face, 0), weight)
+    texture = np.array([p.texture for p in model.parts] + [-1]).take(part)
     for k in np.unique(texture[texture >= 0]):
-        here = texture == k
-        colour[hit[here]] *= lookup(textures[k], st[here])
+        here = np.flatnonzero(texture == k)
+        colour[here] *= lookup(textures[k], _interpolated(model.ST, face.take(here), weight.take(here, 0)))
     return colour
+
+
+def _interpolated(corners, face, weight):
+    """Values (n, c) of corner values (n_f, 3, c) at barycentric weights (n, 3) of faces."""
+    value = corners.take(face, 0)
+    return sum(weight[:, k, None] * value[:, k] for k in range(3))
 
 
 def lookup(texture, st):
@@ -157,11 +176,13 @@ def lookup(texture, st):
     h, w = texture.rgb.shape[:2]
     x, y = st[:, 0] * w - 0.5, st[:, 1] * h - 0.5
     i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    a, b = (x - i)[:, None], (y - j)[:, None]
+    a, b = ((x - i)[:, None]).astype(np.float32), ((y - j)[:, None]).astype(np.float32)
     i0, i1 = (_wrap(k, w, texture.wrap[0]) for k in (i, i + 1))
-    j0, j1 = (_wrap(k, h, texture.wrap[1]) for k in (j, j + 1))
-    rgb = texture.rgb
-    return (1 - b) * ((1 - a) * rgb[j0, i0] + a * rgb[j0, i1]) + b * ((1 - a) * rgb[j1, i0] + a * rgb[j1, i1])
+    j0, j1 = (_wrap(k, h, texture.wrap[1]) * w for k in (j, j + 1))
+    rgb = texture.rgb.reshape(-1, 3)
+    upper = (1 - a) * rgb.take(j0 + i0, 0) + a * rgb.take(j0 + i1, 0)
+    lower = (1 - a) * rgb.take(j1 + i0, 0) + a * rgb.take(j1 + i1, 0)
+    return (1 - b) * upper + b * lower
 
 
 def _wrap(k, n, how):

@@ -5,7 +5,7 @@ import pytest
 
 from lib.maps.colour import srgb_to_linear
 from lib.report.camera import Camera, automatic
-from lib.report.picture import Part, Texture, join, lookup, render
+from lib.report.picture import Part, Texture, join, lookup, render, render_with_edges
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
 TRIANGLES = np.array([[0, 1, 2], [0, 2, 3]])
@@ -65,7 +65,8 @@ def test_a_back_face_is_seen_through_and_a_two_sided_one_is_not():
 
 def test_edges_darken_where_triangles_meet():
     model = join([Part(SQUARE, TRIANGLES)])
-    image = render(model, [], STRAIGHT, 20, 20, samples=1, edges=0.5)
+    plain, image = render_with_edges(model, [], STRAIGHT, 20, 20, samples=1, edges=0.5)
+    assert plain.min() == 255
     assert image[10, 5].tolist() == [255] * 3
     assert (image[:, :, 0] == 188).sum() >= 19  # the diagonal
 
