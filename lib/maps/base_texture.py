@@ -28,9 +28,9 @@ def rho_average(surface, picture, repeat=(1, 1)):
     Exact for constant pictures on any surface and for any picture where |S_u x S_v| is constant; else midpoint rule
     on at least CELLS^2 cells that never straddle a knot.
     """
-    rho, weight = rho_cells(surface, picture, repeat)
-    low = rho.min(axis=(0, 1))  # taken off first: a constant picture keeps its value to the last bit
-    return low + np.einsum("ji,jic->c", weight, rho - low) / weight.sum()
+    low = picture.min(axis=(0, 1)).astype(np.float64)  # taken off first: a constant keeps its value to the last bit
+    contrast, weight = rho_cells(surface, picture - low, repeat)
+    return low + np.einsum("ji,jic->c", weight, contrast) / weight.sum()
 
 
 def rho_cells(surface, picture, repeat=(1, 1)):
@@ -82,7 +82,8 @@ def evaluate_picture(picture, repeat, w, h, wrap=(False, False), collapsed=(Fals
     if w < 2 or h < 2:
         raise ValueError(f"map of {w} x {h} samples, expected at least 2 x 2")
     rho = _at_crossings(_bottom_up(picture), h, repeat[1], wrap[1], axis=0)
-    rho = np.clip(_at_crossings(rho, w, repeat[0], wrap[0], axis=1), 0, 1).astype(np.float32)
+    rho = _at_crossings(rho, w, repeat[0], wrap[0], axis=1).astype(np.float32, copy=False)
+    np.clip(rho, 0, 1, out=rho)
     for side, line in enumerate((np.s_[:, 0], np.s_[:, -1], np.s_[0], np.s_[-1])):
         if collapsed[side]:
             row = rho[line].astype(np.float64)
@@ -117,23 +118,25 @@ def _lerp(array, at, wrap, axis):
     else:
         low, high = np.clip(low, 0, n - 1), np.clip(low + 1, 0, n - 1)
     first = np.take(array, low, axis)
-    return first + t * (np.take(array, high, axis) - first)
+    step = np.take(array, high, axis)
+    step -= first
+    step *= t
+    return np.add(first, step, out=step)
 
 
 def _box(array, low, high, axis):
-    """Return means over the intervals [low, high] [pixels] of a picture of constant squares, periodic; float64."""
-    array = np.moveaxis(array, axis, 0)
-    total = np.zeros((array.shape[0] + 1, *array.shape[1:]))
-    np.cumsum(array, axis=0, dtype=np.float64, out=total[1:])
-
-    def integral(x):
-        whole = np.floor(x).astype(int)
-        turns, k = np.divmod(whole, array.shape[0])
-        shape = (-1,) + (1,) * (array.ndim - 1)
-        return total[k] + turns.reshape(shape) * total[-1] + (x - whole).reshape(shape) * array[k]
-
-    means = (integral(high) - integral(low)) / (high - low).reshape((-1,) + (1,) * (array.ndim - 1))
-    return np.moveaxis(means, 0, axis)
+    """Return means over the intervals [low, high] [pixels] of a picture of constant squares, periodic."""
+    first = np.floor(low).astype(int)
+    n_taps = int((np.ceil(high) - first).max())
+    kind = array.dtype if n_taps <= 16 else np.float64  # long sums outgrow float32
+    shape = [-1 if k == axis else 1 for k in range(array.ndim)]
+    total = 0
+    for k in (first + tap for tap in range(n_taps)):
+        share = np.maximum(np.minimum(high, k + 1) - np.maximum(low, k), 0) / (high - low)
+        part = np.take(array, k % array.shape[axis], axis).astype(kind, copy=False)
+        part *= share.astype(kind).reshape(shape)
+        total += part
+    return total
 
 
 def _bottom_up(picture):
@@ -198,4 +201,5 @@ def apply(B, rho, rho_avg):
     """
     rho_avg = np.asarray(rho_avg, np.float64)
     factor = np.divide(1, rho_avg, out=np.zeros(3), where=rho_avg > 0)
-    return B * (rho * factor.astype(np.float32))
+    ratio = rho * factor.astype(np.float32)
+    return np.multiply(B, ratio, out=ratio)
