@@ -2,19 +2,23 @@
 
 Predicate (midpoint rule): a leaf is divided if one of the five midpoints measured in its PARENT departs from the parent's bilinear
 prediction by more than tau.  At the base level, where no parent was measured, it is the contrast of the four corners.
-Hidden samples take no part.  The tree is kept balanced, and corners that balancing adds are measured like any other.
+Hidden samples take no part.  A leaf that is wide beside the free space above one of its corners is divided as well, for a few levels: light
+that bounces changes within such distances (Ward et al. 1988), and a contact can lie between samples that agree.  The tree is kept balanced, and corners that balancing adds are measured like any other.
 """
 
 import numpy as np
 
 from lib.elements.balance import balance, children
 
+WIDE, WIDE_LEVELS = 1.0, 2  # root-cell widths; levels below the base
+
 
 class Quadtree:
     """State of one tree.
 
     lattice : Lattice; level : of the arrays below, which hold the whole lattice of that level
-    value (h, w, C) float32, known, hidden (h, w) bool, noise (h, w) float32 standard error of the sample
+    value (h, w, C) float32, known, hidden (h, w) bool, noise (h, w) float32 standard error of the sample,
+        reach (h, w) float32 free space above it in root cells, inf where nobody asked
     divided : list of (n_v 2^l, n_u 2^l) bool for l < level
     """
 
@@ -23,6 +27,7 @@ class Quadtree:
         shape = lattice.shape(base)
         self.value = np.zeros((*shape, channels), dtype=np.float32)
         self.noise = np.zeros(shape, dtype=np.float32)
+        self.reach = np.full(shape, np.inf, dtype=np.float32)
         self.known = np.zeros(shape, dtype=bool)
         self.hidden = np.zeros(shape, dtype=bool)
         self.divided = [np.ones(lattice.cells(level), dtype=bool) for level in range(base)]
@@ -32,12 +37,13 @@ class Quadtree:
         """Crossings j, i (m,) of the current level that must be measured next."""
         return np.nonzero(self._wanted)
 
-    def put(self, value, hidden, noise):
-        """Store the samples of wanted(), in its order: value (m, C), hidden (m,), noise (m,)."""
-        self.value[self._wanted], self.hidden[self._wanted], self.noise[self._wanted] = value, hidden, noise
+    def put(self, value, hidden, noise, reach):
+        """Store the samples of wanted(), in its order: value (m, C); hidden, noise, reach (m,)."""
+        self.value[self._wanted], self.hidden[self._wanted] = value, hidden
+        self.noise[self._wanted], self.reach[self._wanted] = noise, reach
         self.known |= self._wanted
         self._wanted = np.zeros_like(self.known)
-        for array in (self.value, self.hidden, self.noise, self.known):
+        for array in (self.value, self.hidden, self.noise, self.reach, self.known):
             self.lattice.copy_own(array)
 
     def split(self, tau, top):
@@ -66,8 +72,16 @@ class Quadtree:
 
     def _exceeds(self, level, tau):
         if level == self.base:
-            return self.contrast(level) > tau
-        return children(self.residual(level - 1) > tau)
+            return (self.contrast(level) > tau) | self._is_wide(level)
+        exceeds = children(self.residual(level - 1) > tau)
+        return exceeds | self._is_wide(level) if level < self.base + WIDE_LEVELS else exceeds
+
+    def _is_wide(self, level):
+        """Cells wider than WIDE times the free space above one of their corners: (rows, columns)."""
+        step = 2 ** (self.level - level)
+        reach = self.reach[::step, ::step]
+        least = np.minimum.reduce([reach[:-1, :-1], reach[:-1, 1:], reach[1:, :-1], reach[1:, 1:]])
+        return 2.0**-level > WIDE * least
 
     def contrast(self, level):
         """Largest difference between visible corners of each cell of a level, over channels: (rows, columns)."""
@@ -96,7 +110,7 @@ class Quadtree:
     def _deepen(self):
         self.level += 1
         shape = self.lattice.shape(self.level)
-        for name in ("value", "noise", "known", "hidden"):
+        for name in ("value", "noise", "reach", "known", "hidden"):
             old = getattr(self, name)
             new = np.zeros((*shape, *old.shape[2:]), dtype=old.dtype)
             new[::2, ::2] = old

@@ -4,6 +4,9 @@
 
 Two-pass radiosity (Lischinski et al. 1993): H_direct from the fine direct maps, H_indirect from the elements; never emission; nothing from
 misses, back faces and surfaces without elements.
+
+A hit nearer than the elements there are wide can not be told from its neighbours by them: near a contact they know only the mean of what
+is lit and what is not.  There one more cosine ray stands for H_indirect, and so on while hits stay near (Jensen 1996, final gathering).
 """
 
 from dataclasses import dataclass
@@ -11,31 +14,42 @@ from dataclasses import dataclass
 import numpy as np
 
 from lib.elements.grids import at_centres
+from lib.elements.lattice import OFFSET
 from lib.visibility.hemisphere import cosine_directions
 from lib.visibility.hidden import is_hidden
-from lib.visibility.qmc import r2
+from lib.visibility.qmc import r2, weyl
 
 RAYS_AT_ONCE = 16384  # what is gathered stays in the cache
+NEAR = 0.5  # hits nearer than this many element widths are followed on
+MOST_STEPS = 4  # in a narrow gap
 
 
 @dataclass(frozen=True)
 class RadiosityMap:
-    """Reflected radiosity of one surface for lookups: value (h, w, C) float32 and weight (h, w), 0 where hidden."""
+    """Reflected radiosity of one surface for lookups: value (h, w, C) float32 of all light, direct (h, w, C) of direct light alone,
+    weight (h, w), 0 where hidden; rho (C,); width, mean side of its elements in the scene's frame."""
 
     value: np.ndarray
+    direct: np.ndarray
     weight: np.ndarray
+    rho: np.ndarray
+    width: float
 
 
-def radiosity_map(H_direct, hidden, H_element, share, grid, rho, closed):
+def radiosity_map(H_direct, hidden, H_element, share, grid, rho, closed, area):
     """rho (H_direct + H_indirect) on the lattice of a direct map.
 
-    H_direct (h, w, G, 3), hidden (h, w); H_element (n_v n_u, G, 3) indirect, share (n_v n_u,) visible share, grid (n_u, n_v), rho (3,).
+    H_direct (h, w, G, 3), hidden (h, w); H_element (n_v n_u, G, 3) indirect, share (n_v n_u,) visible share, grid (n_u, n_v), rho (3,),
+    area of the surface in the scene's frame.
     """
     h, w, G = H_direct.shape[:3]
     u, v = np.linspace(0, 1, w), np.linspace(0, 1, h)
     indirect = at_centres(H_element.reshape(len(H_element), -1), share, *grid, u, v, closed)
-    value = (H_direct.reshape(h, w, -1) + indirect) * np.tile(rho, G)
-    return RadiosityMap(value.astype(np.float32), (~hidden).astype(np.float32))
+    rho = np.tile(rho, G)
+    direct = H_direct.reshape(h, w, -1) * rho
+    value = direct + indirect * rho
+    width = float(np.sqrt(area / (grid[0] * grid[1])))
+    return RadiosityMap(value.astype(np.float32), direct.astype(np.float32), (~hidden).astype(np.float32), rho, width)
 
 
 class LookupTable:
@@ -45,23 +59,43 @@ class LookupTable:
         """maps : {surface: RadiosityMap}; surfaces without one reflect nothing."""
         width, height = np.full(n_surfaces, 2), np.full(n_surfaces, 2)
         offset = np.zeros(n_surfaces + 1, dtype=np.int64)  # texel 0..3: a map of nothing
-        blocks, total = [np.zeros((4, channels + 1), dtype=np.float32)], 4
-        blocks[0][:, -1] = 1.0
+        nothing = np.zeros((4, channels + 1), dtype=np.float32)
+        nothing[:, -1] = 1.0
+        total, blocks, direct = 4, [nothing], [nothing]
+        rho, near = np.zeros((n_surfaces + 1, channels), dtype=np.float32), np.zeros(n_surfaces + 1, dtype=np.float32)
         for s, m in sorted(maps.items()):
             h, w = m.weight.shape
             width[s], height[s], offset[s] = w, h, total
-            blocks.append(np.concatenate([m.value * m.weight[..., None], m.weight[..., None]], axis=2).reshape(h * w, -1))
+            blocks.append(_weighted(m.value, m.weight))
+            direct.append(_weighted(m.direct, m.weight))
+            rho[s], near[s] = m.rho, NEAR * m.width
             total += h * w
-        self._texels = np.concatenate(blocks)
+        self._all, self._direct = np.concatenate(blocks), np.concatenate(direct)
         self._faces = mesh.texel_coordinates(width, height)
         surface = np.append(mesh.face_surface, n_surfaces)
         width, height = np.append(width, 2), np.append(height, 2)
         self._offset, self._width = offset[surface].astype(np.int64), width[surface].astype(np.int64)
         self._last_i = (width[surface] - 2).astype(np.float32)
         self._last_j = (height[surface] - 2).astype(np.float32)
+        self._rho, self._near = rho[surface], near[surface]
 
-    def __call__(self, hits):
+    def all_light(self, hits):
         """Radiosity seen by each ray, (n, C) float32: 0 for misses and back faces."""
+        return self._look_up(self._all, hits)
+
+    def direct_light(self, hits):
+        """The same of direct light alone."""
+        return self._look_up(self._direct, hits)
+
+    def rho(self, hits):
+        """Reflectance at front hits, (n, C)."""
+        return self._rho[hits.face]
+
+    def is_near(self, hits):
+        """(n,) bool: front hits nearer than the elements there are wide."""
+        return ~hits.is_back & (hits.t < self._near[hits.face]) & (hits.face >= 0)
+
+    def _look_up(self, texels, hits):
         face = np.where(hits.is_back | (hits.face < 0), len(self._offset) - 1, hits.face)
         place = self._faces[face]
         s = place[:, 0] + hits.a * place[:, 2] + hits.b * place[:, 4]
@@ -71,40 +105,64 @@ class LookupTable:
         fs, ft = (s - i)[:, None], (t - j)[:, None]
         width = self._width[face]
         corner = self._offset[face] + j.astype(np.int64) * width + i.astype(np.int64)
-        low = self._texels[corner] * (1 - fs) + self._texels[corner + 1] * fs
+        low = texels[corner] * (1 - fs) + texels[corner + 1] * fs
         corner += width
-        high = self._texels[corner] * (1 - fs) + self._texels[corner + 1] * fs
+        high = texels[corner] * (1 - fs) + texels[corner + 1] * fs
         texel = low * (1 - ft) + high * ft
         weight = texel[:, -1:]
         return texel[:, :-1] / np.where(weight > 0, weight, 1.0)
 
 
+def _weighted(value, weight):
+    return np.concatenate([value * weight[..., None], weight[..., None]], axis=2).reshape(weight.size, -1)
+
+
 @dataclass(frozen=True)
 class IndirectLight:
-    """H (n, C) float32, hidden (n,) bool, noise (n,) float32: standard error from two half-sets of rays, largest channel."""
+    """H (n, C) float32, hidden (n,) bool, noise (n,) float32: standard error from two half-sets of rays, largest channel;
+    reach (n,) float32: harmonic mean distance of what is around, in the scene's frame."""
 
     H: np.ndarray
     hidden: np.ndarray
     noise: np.ndarray
+    reach: np.ndarray
 
 
 def indirect_light(x, N, shift, K, tracer, mesh, table, channels):
     """Gather at points x (n, 3), lifted, with normals N (n, 3), by K rays each."""
     n = len(x)
-    points = r2(K)
+    points, onward = r2(K), weyl(K).astype(np.float32)
     H = np.zeros((n, channels), dtype=np.float32)
-    hidden, noise = np.zeros(n, dtype=bool), np.zeros(n, dtype=np.float32)
+    hidden, noise, reach = np.zeros(n, dtype=bool), np.zeros(n, dtype=np.float32), np.zeros(n, dtype=np.float32)
     step = max(1, RAYS_AT_ONCE // K)
     for first in range(0, n, step):
         part = slice(first, first + step)
         k = len(x[part])
-        D = cosine_directions(N[part], points, shift[part])
+        D = cosine_directions(N[part], points, shift[part]).reshape(-1, 3)
         origins = np.repeat(x[part].astype(np.float32), K, axis=0)
-        hits = tracer.closest(origins, D.reshape(-1, 3))
-        seen = table(hits).reshape(k, K, channels)
+        hits = tracer.closest(origins, D)
+        random = ((onward[None] + shift[part, None, ::-1]) % 1.0).reshape(-1, 2)
+        seen = _follow(origins, D, hits, random, tracer, mesh, table, MOST_STEPS).reshape(k, K, channels)
         half = seen[:, : K // 2 * 2].reshape(k, K // 2, 2, channels).mean(axis=1)
         H[part] = seen.mean(axis=1)
         noise[part] = np.abs(half[:, 0] - half[:, 1]).max(axis=1) / 2
         back = hits.is_back.reshape(k, K)
         hidden[part] = is_hidden(back, mesh.is_shell(hits.face).reshape(k, K)) if back.any() else False
-    return IndirectLight(H, hidden, noise)
+        reach[part] = K / (1 / np.maximum(hits.t, 1e-6)).reshape(k, K).sum(axis=1)
+    return IndirectLight(H, hidden, noise, reach)
+
+
+def _follow(origins, D, hits, random, tracer, mesh, table, steps):
+    """Radiosity along rays; near hits are followed by one ray each, at most `steps` deep."""
+    seen = table.all_light(hits)
+    near = np.flatnonzero(table.is_near(hits)) if steps else ()
+    if len(near):
+        there = hits[near]
+        N = mesh.normal[there.face]
+        x = (origins[near] + there.t[:, None] * D[near] + N * OFFSET).astype(np.float32)
+        onward = cosine_directions(N, np.zeros((1, 2)), random[near])[:, 0]
+        beyond = tracer.closest(x, onward)
+        turned = (random[near] + 0.6180339887) % 1.0
+        H = _follow(x, onward, beyond, turned, tracer, mesh, table, steps - 1)
+        seen[near] = table.direct_light(there) + table.rho(there) * H
+    return seen

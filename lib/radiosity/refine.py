@@ -14,19 +14,19 @@ SMOOTH = 0.25  # dividing a cell once more leaves a quarter of the departure of 
 def refine(world, trees, sample, seed, tau, top):
     """Measure and divide until every leaf is within its threshold.
 
-    trees : {surface: Quadtree}, whose wanted() samples are missing; sample(points) -> value (n, C), hidden (n,), noise (n,)
+    trees : {surface: Quadtree}, whose wanted() samples are missing; sample(points) -> value (n, C), hidden, noise, reach (n,)
     tau : {surface: threshold [W/m^2]}; top : deepest level.  Works on the trees in place.
     """
     active = sorted(s for s in trees if len(trees[s].wanted()[0]) or trees[s].split(tau[s], top))
     while active:
         wanted = {s: trees[s].wanted() for s in active}
         points = points_at(world, seed, wanted, {s: trees[s].level for s in active})
-        value, hidden, noise = sample(points)
+        value, hidden, noise, reach = sample(points)
         first = 0
         for s in active:
             part = slice(first, first + len(wanted[s][0]))
             first = part.stop
-            trees[s].put(value[part], hidden[part], noise[part])
+            trees[s].put(value[part], hidden[part], noise[part], reach[part])
         active = [s for s in active if trees[s].split(tau[s], top)]
 
 
@@ -39,12 +39,13 @@ def refine_direct(world, base, seed, tau, top, level, shadow_rays):
     for s, (value, hidden, _) in base.items():
         trees[s] = Quadtree(world.lattices[s], level, world.channels)
         own = trees[s].wanted()
-        trees[s].put(value[own], hidden[own], np.zeros(len(own[0]), dtype=np.float32))
+        trees[s].put(value[own], hidden[own], 0.0, np.inf)
 
     def sample(points):
         light, buried = direct_at(world, points, shadow_rays)
         spared[:] += light.below_horizon, light.dim, light.agreed
-        return light.H.reshape(len(buried), -1), buried, np.zeros(len(buried), dtype=np.float32)
+        none = np.zeros(len(buried), dtype=np.float32)
+        return light.H.reshape(len(buried), -1), buried, none, none + np.inf
 
     refine(world, trees, sample, seed, tau, top)
     return trees, spared
@@ -53,10 +54,12 @@ def refine_direct(world, base, seed, tau, top, level, shadow_rays):
 def refine_indirect(world, surfaces, table, seed, tau, top, level, K):
     """Indirect trees of `surfaces`, by K gather rays a sample through the LookupTable: {surface: Quadtree}."""
     trees = {s: Quadtree(world.lattices[s], level, world.channels) for s in surfaces}
+    side = np.array([max(e) for e in world.casters.extent], dtype=np.float32)
+    side /= [max(lattice.roots) for lattice in world.lattices]
 
     def sample(points):
         light = indirect_light(points.x, points.N, points.shift, K, world.tracer, world.mesh, table, world.channels)
-        return light.H, light.hidden, light.noise
+        return light.H, light.hidden, light.noise, light.reach / side[points.surface]
 
     refine(world, trees, sample, f"{seed} indirect", tau, top)
     return trees
@@ -74,7 +77,7 @@ def lookup_table(world, direct, solution):
         part = slice(solution.first[s], solution.first[s + 1])
         grid = int(solution.n_u[s]), int(solution.n_v[s])
         closed = world.lattices[s].closed
-        maps[int(s)] = radiosity_map(value, hidden, solution.H_indirect[part], solution.share[part], grid, solution.rho[s], closed)
+        maps[int(s)] = radiosity_map(value, hidden, solution.H_indirect[part], solution.share[part], grid, solution.rho[s], closed, world.casters.area[s])
     return LookupTable(maps, world.mesh, world.n, world.channels)
 
 

@@ -58,7 +58,7 @@ class World:
     def mesh(self):
         """What its faces mean."""
         c = self.casters
-        return MeshLookup(c.F, c.UV, c.face_surface, c.shell)
+        return MeshLookup(c.V, c.F, c.UV, c.face_surface, c.shell)
 
     def grids(self, n_elements):
         """Element grids of the scene."""

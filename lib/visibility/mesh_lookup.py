@@ -6,13 +6,16 @@ import numpy as np
 class MeshLookup:
     """Per-face tables over the caster mesh.
 
-    face_surface (m,) int; UV (n_v, 2); F (m, 3); shell (n,) int, -1 where the surface belongs to no closed shell.
+    V (n_v, 3);  face_surface (m,) int; UV (n_v, 2); F (m, 3); shell (n,) int, -1 where the surface belongs to no closed shell.
     """
 
-    def __init__(self, F, UV, face_surface, shell):
+    def __init__(self, V, F, UV, face_surface, shell):
         self.face_surface = np.asarray(face_surface)
         corners = np.asarray(UV, dtype=np.float64)[np.asarray(F)]
         self._uv = np.stack([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1)
+        V = np.asarray(V, dtype=np.float64)
+        cross = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]) if len(F) else np.zeros((0, 3))
+        self.normal = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
         self._is_shell = np.append((np.asarray(shell) >= 0)[self.face_surface], False)
 
     def is_shell(self, face):

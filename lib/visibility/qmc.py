@@ -21,6 +21,12 @@ def r2(n, first=1):
     return (0.5 + k[:, None] * R2_STEP) % 1.0
 
 
+def weyl(n, first=1):
+    """Points of another additive recurrence, steps sqrt 2 and sqrt 3: the second pair of coordinates of a path beside r2."""
+    k = np.arange(first, first + n, dtype=np.float64)
+    return (k[:, None] * np.sqrt([2.0, 3.0])) % 1.0
+
+
 def stream(seed, name):
     """A 64-bit key for everything drawn on the surface called `name`."""
     digest = hashlib.blake2b(f"{seed}\0{name}".encode(), digest_size=8).digest()

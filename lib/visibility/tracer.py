@@ -13,16 +13,23 @@ from embreex.rtcore_scene import EmbreeScene
 
 REACH = np.float32(0.9995)  # a shadow ray to a point stops short of the surface that holds the point
 
+MISSED = np.float32(1e37)
+
 
 @dataclass(frozen=True)
 class Hits:
     """Closest hits of n rays: face (n,) int32, -1 where nothing; a, b (n,) float32 barycentric weights of the face's second and
-    third vertex; is_back (n,) bool, the ray arrives from behind the face."""
+    third vertex; is_back (n,) bool, the ray arrives from behind the face; t (n,) float32 in units of the direction, 1e37 on a miss."""
 
     face: np.ndarray
     a: np.ndarray
     b: np.ndarray
     is_back: np.ndarray
+    t: np.ndarray
+
+    def __getitem__(self, chosen):
+        """The hits of some of the rays."""
+        return Hits(self.face[chosen], self.a[chosen], self.b[chosen], self.is_back[chosen], self.t[chosen])
 
 
 class Tracer:
@@ -43,12 +50,12 @@ class Tracer:
         self.rays += n
         if self._scene is None or not n:
             none = np.zeros(n, dtype=np.float32)
-            return Hits(np.full(n, -1, dtype=np.int32), none, none, np.zeros(n, dtype=bool))
+            return Hits(np.full(n, -1, dtype=np.int32), none, none, np.zeros(n, dtype=bool), none + MISSED)
         tfar = None if reach is None else np.full(n, reach, dtype=np.float32)
         hit = self._scene.run(origins, directions, tfar, output=1)
         Ng = hit["Ng"]
         towards = Ng[:, 0] * directions[:, 0] + Ng[:, 1] * directions[:, 1] + Ng[:, 2] * directions[:, 2]
-        return Hits(hit["primID"], hit["u"], hit["v"], towards > 0)
+        return Hits(hit["primID"], hit["u"], hit["v"], towards > 0, hit["tfar"])
 
     def is_blocked(self, origins, D):
         """(n,) bool: something stands between each origin and the point origin + D, the last 1/2000 left out."""
