@@ -7,6 +7,7 @@ reads   scene.npz, light maps of one chunk, materials and textures JSON    (lib.
 writes  textured maps of the chunk                                         (lib.formats.textured_maps)
         MAPS_FOLDER/<surface>.exr for each surface: B without base texture, full size
 """
+
 import hashlib
 import json
 from pathlib import Path
@@ -52,8 +53,17 @@ def body(args, cost):
         write_map(Path(args.maps_folder) / f"{x.files[s]}.exr", B, hidden, name, surface, rho_avg[name])
         if name in textures:
             picture = load_picture(textures[name], name, loaded, used)
-            level, B, hidden = textured(B, hidden, chunk.maps.roots[k], chunk.maps.level[k], surface, picture,
-                                        textures[name]["repeat"], rho_avg[name], texture_level)
+            level, B, hidden = textured(
+                B,
+                hidden,
+                chunk.maps.roots[k],
+                chunk.maps.level[k],
+                surface,
+                picture,
+                textures[name]["repeat"],
+                rho_avg[name],
+                texture_level,
+            )
         else:
             level = int(chunk.maps.level[k])
         final.append(B)
@@ -62,16 +72,19 @@ def body(args, cost):
 
     maps, names = chunk.maps, [x.names[s] for s in chunk.maps.surface]
     cost.notes["textured_surfaces"] = sum(name in textures for name in names)
-    textured_maps.save(args.out, textured_maps.TexturedMaps(
-        names=names,
-        light=pack(maps.surface, maps.roots, maps.level, light, light_hidden),
-        final=pack(maps.surface, maps.roots, final_level, final, final_hidden),
-        E=(x.E * weights[x.group])[maps.surface],
-        rho_avg=np.array([rho_avg[name] for name in names], np.float64).reshape(-1, 3),
-        textured=np.array([name in textures for name in names], bool),
-        pictures=used,
-        stats=chunk.stats,
-    ))
+    textured_maps.save(
+        args.out,
+        textured_maps.TexturedMaps(
+            names=names,
+            light=pack(maps.surface, maps.roots, maps.level, light, light_hidden),
+            final=pack(maps.surface, maps.roots, final_level, final, final_hidden),
+            E=(x.E * weights[x.group])[maps.surface],
+            rho_avg=np.array([rho_avg[name] for name in names], np.float64).reshape(-1, 3),
+            textured=np.array([name in textures for name in names], bool),
+            pictures=used,
+            stats=chunk.stats,
+        ),
+    )
 
 
 def checked_level(level):
@@ -115,21 +128,26 @@ def textured(B, hidden, roots, level, surface, picture, repeat, rho_avg, texture
     common = base_texture.common_level(roots, level, picture.shape[1::-1], repeat, texture_level)
     B, hidden = base_texture.upsample(B, hidden, common - level)
     w, h = side_lengths(roots, common)
-    rho = base_texture.evaluate_picture(picture, repeat, w, h, base_texture.wraps(surface, repeat),
-                                        collapsed_sides(surface))
+    rho = base_texture.evaluate_picture(
+        picture, repeat, w, h, base_texture.wraps(surface, repeat), collapsed_sides(surface)
+    )
     return common, base_texture.apply(B, rho, rho_avg), hidden
 
 
 def write_map(path, B, hidden, name, surface, rho_avg):
     """Write the illumination map of one surface."""
-    pictures.write_exr(path, one_deep(B, hidden, is_closed(surface)), {
-        "surface": name,
-        "unit": "W/m^2",
-        "quantity": "reflected radiosity B without base texture",
-        "convention": "texel (i, j) is the sample at u = i/(W-1), v = j/(H-1); first row is v = 0",
-        "uv_domain": (0, 1, 0, 1),
-        "rho_avg": tuple(rho_avg),
-    })
+    pictures.write_exr(
+        path,
+        one_deep(B, hidden, is_closed(surface)),
+        {
+            "surface": name,
+            "unit": "W/m^2",
+            "quantity": "reflected radiosity B without base texture",
+            "convention": "texel (i, j) is the sample at u = i/(W-1), v = j/(H-1); first row is v = 0",
+            "uv_domain": (0, 1, 0, 1),
+            "rho_avg": tuple(rho_avg),
+        },
+    )
 
 
 def main(argv=None):

@@ -8,6 +8,7 @@ writes  textures.npz, all surfaces                                         (lib.
 `standard` exports light on its base texture and reduces those maps; `lightmap` exports and reduces the light alone,
 and the base textures count as fixed bytes.
 """
+
 import dataclasses
 import json
 
@@ -49,17 +50,20 @@ def table(names, profile, T, fixed, before, after, steps, D):
     """Return the JSON record: totals, one row a surface, one row a removal in order; bytes are GPU bytes."""
     name_of = dict(zip(before.surface.tolist(), names, strict=True))
     (w0, h0), (w1, h1) = before.sizes(), after.sizes()
-    surfaces = [{
-        "surface": names[k],
-        "level_before": int(before.level[k]),
-        "level_after": int(after.level[k]),
-        "size_before": [int(w0[k]), int(h0[k])],
-        "size_after": [int(w1[k]), int(h1[k])],
-        "bytes_before": budget.gpu_bytes(int(w0[k]), int(h0[k])),
-        "bytes_after": budget.gpu_bytes(int(w1[k]), int(h1[k])),
-        "D": float(D[k]),
-        "D_given_up": sum((step.D for step in steps if step.surface == before.surface[k]), 0.0),
-    } for k in range(len(names))]
+    surfaces = [
+        {
+            "surface": names[k],
+            "level_before": int(before.level[k]),
+            "level_after": int(after.level[k]),
+            "size_before": [int(w0[k]), int(h0[k])],
+            "size_after": [int(w1[k]), int(h1[k])],
+            "bytes_before": budget.gpu_bytes(int(w0[k]), int(h0[k])),
+            "bytes_after": budget.gpu_bytes(int(w1[k]), int(h1[k])),
+            "D": float(D[k]),
+            "D_given_up": sum((step.D for step in steps if step.surface == before.surface[k]), 0.0),
+        }
+        for k in range(len(names))
+    ]
     return {
         "profile": profile,
         "T": int(T),

@@ -1,4 +1,5 @@
 """Artefact of balance_resample: irradiance maps of a chunk of surfaces, per light group."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field

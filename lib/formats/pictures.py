@@ -9,6 +9,7 @@ Rules for what a texture file may hold:
 - integer files are decoded by `colour_space` (srgb or linear); float files (EXR, HDR, ...) are linear whatever it says;
 - every value must be a reflectance, 0 <= rho <= 1.
 """
+
 from __future__ import annotations
 
 import os
@@ -133,8 +134,9 @@ def _open(path):
     spec = source.spec()
     if not (0 < spec.width <= MAX_SIDE and 0 < spec.height <= MAX_SIDE and spec.width * spec.height <= MAX_PIXELS):
         source.close()
-        raise Refusal(f"{path}: {spec.width} x {spec.height} pixels, "
-                      f"allowed are up to {MAX_SIDE} a side and {MAX_PIXELS} in all")
+        raise Refusal(
+            f"{path}: {spec.width} x {spec.height} pixels, allowed are up to {MAX_SIDE} a side and {MAX_PIXELS} in all"
+        )
     if spec.depth > 1 or spec.nchannels < 1:
         source.close()
         raise Refusal(f"{path}: depth {spec.depth}, {spec.nchannels} channels, expected a flat picture")
@@ -150,8 +152,9 @@ def _check_complete(path, file, size):
         if len(head) == 24:
             width, height = struct.unpack(">II", head[16:24])
             if width > MAX_SIDE or height > MAX_SIDE or width * height > MAX_PIXELS:
-                raise Refusal(f"{path}: {width} x {height} pixels, "
-                              f"allowed are up to {MAX_SIDE} a side and {MAX_PIXELS} in all")
+                raise Refusal(
+                    f"{path}: {width} x {height} pixels, allowed are up to {MAX_SIDE} a side and {MAX_PIXELS} in all"
+                )
         at = 8
         while at + 12 <= size:
             file.seek(at)
@@ -165,7 +168,7 @@ def _check_complete(path, file, size):
         data = file.read()
         at = 2
         while at + 4 <= size and data[at] == 0xFF and data[at + 1] != 0xDA:  # walk the segments before the scan
-            at += 2 + struct.unpack(">H", data[at + 2:at + 4])[0] if data[at + 1] != 0xFF else 1
+            at += 2 + struct.unpack(">H", data[at + 2 : at + 4])[0] if data[at + 1] != 0xFF else 1
         if data.rfind(b"\xff\xd9") < at:
             raise Refusal(f"{path}: is cut off: the JPEG has no end")
 
@@ -194,7 +197,7 @@ def _upright(pixels, orientation):
         pixels = pixels.transpose(1, 0, 2)
     flips = {2: (0, 1), 3: (1, 1), 4: (1, 0), 6: (0, 1), 7: (1, 1), 8: (1, 0)}
     flip_rows, flip_columns = flips.get(orientation, (0, 0))
-    return pixels[::-1 if flip_rows else 1, ::-1 if flip_columns else 1]
+    return pixels[:: -1 if flip_rows else 1, :: -1 if flip_columns else 1]
 
 
 def _first_line(text):
@@ -207,8 +210,13 @@ R2 = (0.7548776662466927, 0.5698402909980532)
 
 def dither(h, w):
     """Return thresholds (h, w, 3) float32 in (0, 1): a fixed pattern without clumps, shifted by channel."""
-    row, column = np.arange(h)[:, None, None], np.arange(w)[None, :, None]
-    return ((0.5 + column * R2[0] + row * R2[1] + np.arange(3) / 3) % 1).astype(np.float32) * 0.998 + np.float32(0.001)
+    row = (0.5 + np.arange(h)[:, None] * R2[1] + np.arange(3) / 3) % 1
+    column = np.arange(w) * R2[0] % 1
+    t = row.astype(np.float32)[:, None] + column.astype(np.float32)[:, None]
+    t -= t >= 1
+    t *= np.float32(0.998)  # a value that is a code exactly must not fall to the next by rounding
+    t += np.float32(0.001)
+    return t
 
 
 def quantise_srgb(linear):
@@ -217,8 +225,10 @@ def quantise_srgb(linear):
     A value that is a code exactly keeps it; the mean of an even area is kept to about 1/100 of a code.
     """
     h, w, _ = np.shape(linear)
-    scaled = 255 * linear_to_srgb(np.asarray(linear, np.float32))
-    return np.minimum(scaled + dither(h, w), 255).astype(np.uint8)
+    scaled = linear_to_srgb(np.asarray(linear, np.float32))
+    scaled *= 255
+    scaled += dither(h, w)
+    return np.minimum(scaled, 255, out=scaled).astype(np.uint8)
 
 
 def write_png_srgb(path, linear):

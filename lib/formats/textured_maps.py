@@ -1,4 +1,5 @@
 """Artefact of apply_base_texture and of budget_reduce: maps of B with and without their base texture."""
+
 from __future__ import annotations
 
 from dataclasses import dataclass, field
@@ -73,8 +74,16 @@ def load(path):
     try:
         light = MapSet(**{name: arrays[f"light_{name}"] for name in FIELDS})
         final = MapSet(**{name: arrays[f"final_{name}"] for name in FIELDS})
-        x = TexturedMaps(header["names"], light, final, arrays["E"], arrays["rho_avg"], arrays["textured"],
-                         header["pictures"], header["stats"])
+        x = TexturedMaps(
+            header["names"],
+            light,
+            final,
+            arrays["E"],
+            arrays["rho_avg"],
+            arrays["textured"],
+            header["pictures"],
+            header["stats"],
+        )
     except KeyError as error:
         raise artefact.ArtefactError(f"{path}: field {error} is missing") from None
     check(x, path)

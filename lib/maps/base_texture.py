@@ -10,6 +10,7 @@ whichever is wider.  A box of one pixel over constant squares is bilinear interp
 the border of the domain the picture goes round where it is tiled or the surface is closed; elsewhere the box is cut
 off there, which repeats the border pixel and keeps the mean.
 """
+
 from __future__ import annotations
 
 import numpy as np
@@ -84,6 +85,10 @@ def evaluate_picture(picture, repeat, w, h, wrap=(False, False), collapsed=(Fals
     rho = _at_crossings(_bottom_up(picture), h, repeat[1], wrap[1], axis=0)
     rho = _at_crossings(rho, w, repeat[0], wrap[0], axis=1).astype(np.float32, copy=False)
     np.clip(rho, 0, 1, out=rho)
+    if wrap[0] and float(repeat[0]).is_integer():
+        rho[:, -1] = rho[:, 0]
+    if wrap[1] and float(repeat[1]).is_integer():
+        rho[-1] = rho[0]
     for side, line in enumerate((np.s_[:, 0], np.s_[:, -1], np.s_[0], np.s_[-1])):
         if collapsed[side]:
             row = rho[line].astype(np.float64)
@@ -152,8 +157,9 @@ def common_level(roots, level, picture_size, repeat, texture_level=10):
     roots : [n_u, n_v];  level : of the light map, never gone below;  picture_size : (W, H).
     """
     common = int(level)
-    while common < texture_level and any((int(n) << common) + 1 < size * tiles
-                                         for n, size, tiles in zip(roots, picture_size, repeat, strict=True)):
+    while common < texture_level and any(
+        (int(n) << common) + 1 < size * tiles for n, size, tiles in zip(roots, picture_size, repeat, strict=True)
+    ):
         common += 1
     return common
 

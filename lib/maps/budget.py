@@ -6,6 +6,7 @@ goes round closed directions; hidden samples take no part.
 Conventions: maps (h, w, 3), [j, i], side = roots 2^level + 1.  "Kept" samples have even i and even j; D_i is summed
 over the others.
 """
+
 from __future__ import annotations
 
 import heapq

@@ -1,4 +1,5 @@
 """Transfer between sRGB encoded values and linear light (IEC 61966-2-1, the exact two-piece curve)."""
+
 import numpy as np
 
 

@@ -4,6 +4,7 @@
 everything (exported textures, whose mips read far into the hidden part).  Maps are (h, w, ...), masks (h, w) bool,
 True = hidden.
 """
+
 import numpy as np
 
 NEIGHBOURS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
@@ -22,8 +23,8 @@ def one_deep(value, hidden, closed=(False, False)):
     around, seen = _ring(filled, closed), _ring(~hidden, closed, outside=False)
     h, w = hidden.shape
     for dj, di in NEIGHBOURS:
-        total += around[1 + dj:1 + dj + h, 1 + di:1 + di + w]
-        count += seen[1 + dj:1 + dj + h, 1 + di:1 + di + w]
+        total += around[1 + dj : 1 + dj + h, 1 + di : 1 + di + w]
+        count += seen[1 + dj : 1 + dj + h, 1 + di : 1 + di + w]
     edge = hidden & (count > 0)
     filled[edge] = (total[edge] / _like(count[edge], total[edge])).astype(value.dtype)
     return filled

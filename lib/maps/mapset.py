@@ -3,6 +3,7 @@
 Conventions: a map is indexed [j, i] = [v row, u column], row 0 is v = 0; sample i lies on the grid crossing
 u = i/(w - 1). Side lengths are w = roots_u 2^level + 1 and h = roots_v 2^level + 1.
 """
+
 from __future__ import annotations
 
 from dataclasses import dataclass
@@ -51,7 +52,7 @@ class MapSet:
     def _view(self, packed, k):
         w, h = side_lengths(self.roots[k], self.level[k])
         start = int(self.offsets()[k])
-        return packed[start:start + w * h].reshape(h, w, *packed.shape[1:])
+        return packed[start : start + w * h].reshape(h, w, *packed.shape[1:])
 
     def position(self, surface):
         """Return the k whose map belongs to global surface index `surface`, or -1."""
@@ -128,9 +129,11 @@ def merge(sets):
     if len(sets) == 1:
         return sets[0]
     owners = sorted((int(s), n, k) for n, one in enumerate(sets) for k, s in enumerate(one.surface))
-    return pack([s for s, _, _ in owners],
-                [sets[n].roots[k] for _, n, k in owners],
-                [sets[n].level[k] for _, n, k in owners],
-                [sets[n].map(k) for _, n, k in owners],
-                [sets[n].hidden_map(k) for _, n, k in owners],
-                channels=sets[0].value.shape[1:] if sets else (3,))
+    return pack(
+        [s for s, _, _ in owners],
+        [sets[n].roots[k] for _, n, k in owners],
+        [sets[n].level[k] for _, n, k in owners],
+        [sets[n].map(k) for _, n, k in owners],
+        [sets[n].hidden_map(k) for _, n, k in owners],
+        channels=sets[0].value.shape[1:] if sets else (3,),
+    )

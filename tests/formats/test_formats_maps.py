@@ -1,4 +1,5 @@
 """Light maps and textured maps as files: there and back, and refused when unsound."""
+
 import dataclasses
 
 import numpy as np
@@ -18,9 +19,15 @@ def some_maps(channels, surface=(1, 4), level=(1, 2)):
 
 def textured(surface=(1, 4), names=("a", "b")):
     return textured_maps.TexturedMaps(
-        list(names), some_maps((3,), surface), some_maps((3,), surface, (3, 2)), np.array([[0, 0, 0], [1, 2, 3.0]]),
-        np.array([[0.5, 0.5, 0.5], [0, 0, 0]]), np.array([True, False]), {"12ab": [640, 480]},
-        {names[0]: {"seconds": 1.5}})
+        list(names),
+        some_maps((3,), surface),
+        some_maps((3,), surface, (3, 2)),
+        np.array([[0, 0, 0], [1, 2, 3.0]]),
+        np.array([[0.5, 0.5, 0.5], [0, 0, 0]]),
+        np.array([True, False]),
+        {"12ab": [640, 480]},
+        {names[0]: {"seconds": 1.5}},
+    )
 
 
 def same(one, two):
@@ -55,10 +62,17 @@ def test_chunks_merge_by_surface_in_any_order():
     textured_maps.check(one)
 
 
-@pytest.mark.parametrize("change, word", [
-    ({"names": ["a"]}, "light|final"), ({"E": np.full((2, 3), -1.0)}, "E"),
-    ({"rho_avg": np.full((2, 3), 1.2)}, "rho_avg"), ({"textured": np.zeros(2)}, "textured"),
-    ({"final": some_maps((3,), (1, 5))}, "final"), ({"light": some_maps((1, 3))}, "light")])
+@pytest.mark.parametrize(
+    "change, word",
+    [
+        ({"names": ["a"]}, "light|final"),
+        ({"E": np.full((2, 3), -1.0)}, "E"),
+        ({"rho_avg": np.full((2, 3), 1.2)}, "rho_avg"),
+        ({"textured": np.zeros(2)}, "textured"),
+        ({"final": some_maps((3,), (1, 5))}, "final"),
+        ({"light": some_maps((1, 3))}, "light"),
+    ],
+)
 def test_unsound_maps_are_not_written(change, word, tmp_path):
     with pytest.raises(ArtefactError, match=f"a.npz: ({word})"):
         textured_maps.save(tmp_path / "a.npz", dataclasses.replace(textured(), **change))

@@ -1,4 +1,5 @@
 """Pictures in and out, on files built byte by byte or written and read back."""
+
 import hashlib
 import struct
 import zlib
@@ -69,8 +70,9 @@ def test_grey_of_one_eight_and_sixteen_bits(tmp_path):
 
 
 def test_palette(tmp_path):
-    path = png(tmp_path / "a.png", 3, 1, 8, PALETTE, b"\0\2\0\1",
-               chunk(b"PLTE", bytes([255, 0, 0, 0, 255, 0, 51, 102, 204])))
+    path = png(
+        tmp_path / "a.png", 3, 1, 8, PALETTE, b"\0\2\0\1", chunk(b"PLTE", bytes([255, 0, 0, 0, 255, 0, 51, 102, 204]))
+    )
     got = pictures.read_linear(path, "linear", no_warning)
     assert np.allclose(got, [[[0.2, 0.4, 0.8], [1, 0, 0], [0, 1, 0]]])
 
@@ -87,9 +89,19 @@ def test_alpha_is_ignored_with_one_warning(tmp_path):
     pictures.read_linear(opaque, "linear", no_warning)
 
 
-@pytest.mark.parametrize("orientation, expected", [
-    (1, "12/34/56"), (2, "21/43/65"), (3, "65/43/21"), (4, "56/34/12"),
-    (5, "135/246"), (6, "531/642"), (7, "642/531"), (8, "246/135")])
+@pytest.mark.parametrize(
+    "orientation, expected",
+    [
+        (1, "12/34/56"),
+        (2, "21/43/65"),
+        (3, "65/43/21"),
+        (4, "56/34/12"),
+        (5, "135/246"),
+        (6, "531/642"),
+        (7, "642/531"),
+        (8, "246/135"),
+    ],
+)
 def test_exif_orientation_is_applied(orientation, expected, tmp_path):
     codes = np.repeat(np.array([[1, 2], [3, 4], [5, 6]], np.uint8)[..., None] * 40, 3, axis=2)
     path = tmp_path / "a.tif"
@@ -136,7 +148,7 @@ def broken_files(folder):
     (folder / "bad_crc.png").write_bytes(whole[:3000] + bytes(20) + whole[3020:])
     for name in ("whole.jpg", "whole.exr"):
         data = (folder / name).read_bytes()
-        (folder / name.replace("whole", "cut")).write_bytes(data[:len(data) // 2])
+        (folder / name.replace("whole", "cut")).write_bytes(data[: len(data) // 2])
     (folder / "empty.png").write_bytes(b"")
     (folder / "text.png").write_text("a picture? no")
     (folder / "pointer.png").write_text("version https://git-lfs.github.com/spec/v1\noid sha256:0\nsize 1\n")
@@ -145,11 +157,25 @@ def broken_files(folder):
     png(folder / "wide.png", 2**31 - 1, 1, 8, RGB, b"\0")
 
 
-@pytest.mark.parametrize("name, reason", [
-    ("missing.png", "not found"), ("folder.png", "folder"), ("empty.png", "empty"), ("text.png", "not a picture"),
-    ("pointer.png", "git lfs pull"), ("cut.png", "cut off"), ("no_end.png", "cut off"), ("head.png", "cut off"),
-    ("cut.jpg", "cut off"), ("cut.exr", "cut off"), ("bad_crc.png", "damaged"), ("huge.png", "60000 x 60000"),
-    ("wide.png", "2147483647 x 1"), ("a\0b.png", "can not be read")])
+@pytest.mark.parametrize(
+    "name, reason",
+    [
+        ("missing.png", "not found"),
+        ("folder.png", "folder"),
+        ("empty.png", "empty"),
+        ("text.png", "not a picture"),
+        ("pointer.png", "git lfs pull"),
+        ("cut.png", "cut off"),
+        ("no_end.png", "cut off"),
+        ("head.png", "cut off"),
+        ("cut.jpg", "cut off"),
+        ("cut.exr", "cut off"),
+        ("bad_crc.png", "damaged"),
+        ("huge.png", "60000 x 60000"),
+        ("wide.png", "2147483647 x 1"),
+        ("a\0b.png", "can not be read"),
+    ],
+)
 def test_what_is_no_whole_picture_is_refused_by_name(name, reason, tmp_path):
     broken_files(tmp_path)
     for path in (tmp_path / "whole.png", tmp_path / "whole.jpg", tmp_path / "whole.exr"):
@@ -213,6 +239,7 @@ def test_png_comes_back_to_half_a_code(tmp_path):
     value = np.linspace(0, 1, 64 * 3).reshape(4, 16, 3)
     pictures.write_png_srgb(tmp_path / "a.png", value)
     from lib.maps.colour import linear_to_srgb
+
     assert np.abs(pictures.read_png8(tmp_path / "a.png") / 255 - linear_to_srgb(value)).max() <= CODE
     assert pictures.read_header(tmp_path / "a.png") == pictures.Header(16, 4, 3, False, False)
 
@@ -226,6 +253,7 @@ def test_png8_keeps_codes_alpha_too(channels, tmp_path):
 
 def test_nothing_is_left_where_writing_fails(tmp_path):
     from lib.formats.artefact import ArtefactError
+
     (tmp_path / "a.exr").mkdir()
     with pytest.raises(ArtefactError, match="a.exr"):
         pictures.write_exr(tmp_path / "a.exr", np.zeros((2, 2, 3)))

@@ -1,4 +1,5 @@
 """The texture budget: bytes, losses, the low pass, and the order of removal against a plain oracle."""
+
 import numpy as np
 import pytest
 
@@ -29,8 +30,17 @@ def random_maps(seed, hidden_share=0.0):
     return pack(np.arange(5) * 2, roots, level, maps, hidden)
 
 
-@pytest.mark.parametrize("w, h, expected", [(1, 1, 4), (2, 2, 16 + 4), (3, 3, 36 + 4), (5, 3, 60 + 8 + 4),
-                                            (1024, 1024, 4 * (4**11 - 1) // 3), (1, 8, 32 + 16 + 8 + 4)])
+@pytest.mark.parametrize(
+    "w, h, expected",
+    [
+        (1, 1, 4),
+        (2, 2, 16 + 4),
+        (3, 3, 36 + 4),
+        (5, 3, 60 + 8 + 4),
+        (1024, 1024, 4 * (4**11 - 1) // 3),
+        (1, 8, 32 + 16 + 8 + 4),
+    ],
+)
 def test_bytes_of_a_mip_chain(w, h, expected):
     assert budget.gpu_bytes(w, h) == expected
 
@@ -45,17 +55,13 @@ def test_a_bilinear_map_loses_nothing():
 
 
 def test_loss_of_a_map_drawn_by_hand():
-    value = grey([[0, 1, 0],
-                  [2, 4, 0],
-                  [0, 0, 8]])
+    value = grey([[0, 1, 0], [2, 4, 0], [0, 0, 8]])
     # predictions: top 0, left 0, right 4, bottom 4, centre 2; misses 1 + 2 + 4 + 4 + 2, times three channels
     assert budget.detail(value, visible(value)) == 3 * 13
 
 
 def test_hidden_samples_neither_count_nor_predict():
-    value = grey([[0, 1, 999],
-                  [2, 4, 999],
-                  [0, 0, 8]])
+    value = grey([[0, 1, 999], [2, 4, 999], [0, 0, 8]])
     hidden = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]], bool)
     # predictions without the hidden corner: top 0, left 0, bottom 4, centre 8/3
     assert np.isclose(budget.detail(value, hidden), 3 * (1 + 2 + 4 + 4 / 3))
@@ -158,8 +164,9 @@ def test_the_order_of_removal_is_the_oracles(seed, share):
         S = [budget.total(maps)] + [s.S for s in steps]
         assert np.all(np.diff(S) < 0) and S[-1] == budget.total(reduced) <= T < S[-2]
         assert (reduced.level >= 0).all() and np.array_equal(reduced.roots, maps.roots)
-        assert [D[k] for k in range(5)] == [budget.detail(maps.map(k), maps.hidden_map(k)) if maps.level[k] else 0
-                                            for k in range(5)]
+        assert [D[k] for k in range(5)] == [
+            budget.detail(maps.map(k), maps.hidden_map(k)) if maps.level[k] else 0 for k in range(5)
+        ]
 
 
 def test_equal_losses_go_by_name():
@@ -189,14 +196,19 @@ def test_within_the_budget_nothing_changes():
 
 def test_rubbish_in_hidden_samples_changes_nothing():
     maps = random_maps(7, 0.4)
-    spoilt = pack(maps.surface, maps.roots, maps.level,
-                  [np.where(maps.hidden_map(k)[..., None], 1e20, maps.map(k)) for k in range(5)],
-                  [maps.hidden_map(k) for k in range(5)])
+    spoilt = pack(
+        maps.surface,
+        maps.roots,
+        maps.level,
+        [np.where(maps.hidden_map(k)[..., None], 1e20, maps.map(k)) for k in range(5)],
+        [maps.hidden_map(k) for k in range(5)],
+    )
     T = budget.total(maps) // 4
     one, two = (budget.reduce(x, np.zeros((5, 2), bool), T) for x in (maps, spoilt))
     assert one[1] == two[1]
-    assert all(np.array_equal(one[0].map(k)[~one[0].hidden_map(k)], two[0].map(k)[~two[0].hidden_map(k)])
-               for k in range(5))
+    assert all(
+        np.array_equal(one[0].map(k)[~one[0].hidden_map(k)], two[0].map(k)[~two[0].hidden_map(k)]) for k in range(5)
+    )
 
 
 def test_the_smallest_total_can_be_met_and_one_byte_less_is_refused_with_both_numbers():

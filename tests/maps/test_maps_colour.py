@@ -1,4 +1,5 @@
 """The sRGB transfer of IEC 61966-2-1."""
+
 import numpy as np
 
 from lib.maps.colour import linear_to_srgb, srgb_to_linear
@@ -6,8 +7,11 @@ from lib.maps.colour import linear_to_srgb, srgb_to_linear
 
 def test_published_values():
     # 8-bit codes and their linear light; 188 is the code of half the light to a quarter of a code
-    assert np.allclose(srgb_to_linear(np.array([0, 10, 11, 128, 188, 255]) / 255),
-                       [0, 0.003035269, 0.003346536, 0.215860500, 0.502886458, 1], atol=1e-8)
+    assert np.allclose(
+        srgb_to_linear(np.array([0, 10, 11, 128, 188, 255]) / 255),
+        [0, 0.003035269, 0.003346536, 0.215860500, 0.502886458, 1],
+        atol=1e-8,
+    )
     assert abs(linear_to_srgb(0.5) * 255 - 187.516) < 1e-3
 
 

@@ -1,4 +1,5 @@
 """Filling hidden texels: pictures small enough to see."""
+
 import numpy as np
 
 from lib.maps.fill import one_deep, push_pull

@@ -1,4 +1,5 @@
 """Packed maps: views, sizes, order."""
+
 import numpy as np
 import pytest
 
@@ -50,14 +51,17 @@ def test_no_surface_at_all():
     assert len(empty) == 0 and empty.value.shape == (0, 2, 3) and mapset.merge([empty]).offsets().tolist() == [0]
 
 
-@pytest.mark.parametrize("field, value, message", [
-    ("value", np.zeros((19, 3)), "value"),
-    ("value", np.zeros((18, 3), np.float32), "value"),
-    ("value", np.full((19, 3), np.nan, np.float32), "not finite .surface 4"),
-    ("hidden", np.zeros(19), "hidden"),
-    ("surface", np.array([7, 4], np.int32), "ascending"),
-    ("level", np.array([1, -1], np.int32), "level"),
-])
+@pytest.mark.parametrize(
+    "field, value, message",
+    [
+        ("value", np.zeros((19, 3)), "value"),
+        ("value", np.zeros((18, 3), np.float32), "value"),
+        ("value", np.full((19, 3), np.nan, np.float32), "not finite .surface 4"),
+        ("hidden", np.zeros(19), "hidden"),
+        ("surface", np.array([7, 4], np.int32), "ascending"),
+        ("level", np.array([1, -1], np.int32), "level"),
+    ],
+)
 def test_check_names_the_broken_field(field, value, message):
     packed, *_ = two_maps()
     fields = {name: getattr(packed, name) for name in ("surface", "roots", "level", "value", "hidden")}

@@ -1,4 +1,5 @@
 """apply_base_texture through its door: a plain wall, a painted wall and a lamp in two light groups."""
+
 import json
 
 import numpy as np
@@ -22,24 +23,57 @@ def build(folder, H=None, hidden=None, codes=None):
     """Write scene, maps of surfaces 1 (painted) and 2 (wall), materials and textures; return the stage's options."""
     rng = np.random.default_rng(0)
     names = ["lamp", "painted", "wall"]
-    scene.save(folder / "scene.npz", scene.Scene(
-        names=names, files=["000-lamp", "001-painted", "002-wall"], surfaces=[square(z) for z in (2, 0, 1)],
-        flip=np.zeros(3, bool), role=["full"] * 3, E=np.array([[5, 4, 3], [0, 0, 0], [0, 1, 0]], float),
-        group=np.array([1, 0, 0], np.int32), groups=["day", "night"], is_black=np.zeros(3, bool),
-        reconstruction=["auto"] * 3, tolerance=np.full(3, np.nan), material=names, up="z", warnings=[]))
+    scene.save(
+        folder / "scene.npz",
+        scene.Scene(
+            names=names,
+            files=["000-lamp", "001-painted", "002-wall"],
+            surfaces=[square(z) for z in (2, 0, 1)],
+            flip=np.zeros(3, bool),
+            role=["full"] * 3,
+            E=np.array([[5, 4, 3], [2, 0, 1], [0, 1, 0]], float),
+            group=np.array([1, 0, 0], np.int32),
+            groups=["day", "night"],
+            is_black=np.zeros(3, bool),
+            reconstruction=["auto"] * 3,
+            tolerance=np.full(3, np.nan),
+            material=names,
+            up="z",
+            warnings=[],
+        ),
+    )
     H = [rng.random((9, 9, 2, 3)), rng.random((3, 3, 2, 3))] if H is None else H
     maps = pack([1, 2], [[1, 1], [1, 1]], [3, 1], H, hidden)
     light_maps.save(folder / "light.npz", light_maps.LightMaps(maps, {"wall": {"depth": 1}}))
     codes = rng.integers(0, 256, (20, 30, 3), np.uint8) if codes is None else codes
     pictures.write_png8(folder / "paint.png", codes)
     rho = base_texture.rho_average(square(0), pictures.read_linear(folder / "paint.png"))
-    (folder / "materials.json").write_text(json.dumps(
-        {"rho_avg": {"lamp": [0, 0, 0], "painted": rho.tolist(), "wall": [0.7, 0.5, 0]}}))
-    (folder / "textures.json").write_text(json.dumps(
-        {"textures": {"painted": {"file": str(folder / "paint.png"), "colour_space": "srgb", "repeat": [1, 1]}}}))
-    return maps, rho, ["--scene", str(folder / "scene.npz"), "--maps", str(folder / "light.npz"),
-                       "--materials", str(folder / "materials.json"), "--textures", str(folder / "textures.json"),
-                       "--maps-folder", str(folder / "maps"), "--out", str(folder / "out.npz")]
+    (folder / "materials.json").write_text(
+        json.dumps({"rho_avg": {"lamp": [0, 0, 0], "painted": rho.tolist(), "wall": [0.7, 0.5, 0]}})
+    )
+    (folder / "textures.json").write_text(
+        json.dumps(
+            {"textures": {"painted": {"file": str(folder / "paint.png"), "colour_space": "srgb", "repeat": [1, 1]}}}
+        )
+    )
+    return (
+        maps,
+        rho,
+        [
+            "--scene",
+            str(folder / "scene.npz"),
+            "--maps",
+            str(folder / "light.npz"),
+            "--materials",
+            str(folder / "materials.json"),
+            "--textures",
+            str(folder / "textures.json"),
+            "--maps-folder",
+            str(folder / "maps"),
+            "--out",
+            str(folder / "out.npz"),
+        ],
+    )
 
 
 def run(folder, options, **settings):
@@ -60,7 +94,8 @@ def test_groups_are_summed_and_the_painted_wall_gets_its_picture(tmp_path):
     H_fine = base_texture.upsample(H[0], np.zeros((9, 9), bool), 2)[0]
     rho = base_texture.evaluate_picture(pictures.read_linear(tmp_path / "paint.png"), (1, 1), 33, 33)
     assert np.allclose(out.final.map(0), H_fine * rho, rtol=ROUND, atol=1e-7)  # the other form of equation (1)
-    assert out.E.tolist() == [[0, 0, 0], [0, 1, 0]] and list(out.pictures.values()) == [[30, 20]]
+    # the painted wall also emits: its E is in neither map
+    assert out.E.tolist() == [[2, 0, 1], [0, 1, 0]] and list(out.pictures.values()) == [[30, 20]]
     assert out.stats == {"wall": {"depth": 1}}
 
 
@@ -79,7 +114,7 @@ def test_intensity_scales_one_group_and_its_lamps(tmp_path):
     out = run(tmp_path, options, intensity={"day": 2, "night": [0, 0.5, 1]})[1]
     H = 2 * maps.map(1)[:, :, 0] + maps.map(1)[:, :, 1] * [0, 0.5, 1]
     assert np.allclose(out.light.map(1), H * [0.7, 0.5, 0], rtol=ROUND)
-    assert out.E.tolist() == [[0, 0, 0], [0, 2, 0]]
+    assert out.E.tolist() == [[4, 0, 2], [0, 2, 0]]
 
 
 def test_exr_maps_hold_full_size_light_without_texture_filled_one_texel_deep(tmp_path):
@@ -116,11 +151,16 @@ def test_same_input_same_bytes(tmp_path):
     assert [(tmp_path / name).read_bytes() for name in files] == first
 
 
-@pytest.mark.parametrize("settings, message", [
-    ({"texture_level": -1}, "texture_level: -1, allowed"), ({"texture_level": True}, "texture_level"),
-    ({"intensity": {"dusk": 1}}, "intensity: dusk: no such light group, the scene has day, night"),
-    ({"intensity": {"day": -1}}, "intensity"), ({"intensity": {"day": "bright"}}, "intensity: day: 'bright'"),
-])
+@pytest.mark.parametrize(
+    "settings, message",
+    [
+        ({"texture_level": -1}, "texture_level: -1, allowed"),
+        ({"texture_level": True}, "texture_level"),
+        ({"intensity": {"dusk": 1}}, "intensity: dusk: no such light group, the scene has day, night"),
+        ({"intensity": {"day": -1}}, "intensity"),
+        ({"intensity": {"day": "bright"}}, "intensity: day: 'bright'"),
+    ],
+)
 def test_unfit_settings_are_refused(settings, message, tmp_path, capsys):
     _, _, options = build(tmp_path)
     assert run(tmp_path, options, **settings)[0] == 1

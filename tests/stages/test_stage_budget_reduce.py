@@ -1,4 +1,5 @@
 """budget_reduce through its door: two chunks, one budget."""
+
 import json
 
 import numpy as np
@@ -17,28 +18,59 @@ def build(folder):
 
     def chunk(names, surface, level, amount):
         light = pack(surface, [[1, 1]] * len(surface), [1] * len(surface), [rng.random((3, 3, 3)) for _ in surface])
-        final = pack(surface, [[1, 1]] * len(surface), level,
-                     [rng.random((2**n + 1, 2**n + 1, 3)) * a for n, a in zip(level, amount, strict=True)])
+        final = pack(
+            surface,
+            [[1, 1]] * len(surface),
+            level,
+            [rng.random((2**n + 1, 2**n + 1, 3)) * a for n, a in zip(level, amount, strict=True)],
+        )
         m = len(names)
-        return textured_maps.TexturedMaps(names, light, final, np.zeros((m, 3)), np.full((m, 3), 0.5),
-                                          np.ones(m, bool), {"ab": [100, 50]}, {})
+        return textured_maps.TexturedMaps(
+            names, light, final, np.zeros((m, 3)), np.full((m, 3), 0.5), np.ones(m, bool), {"ab": [100, 50]}, {}
+        )
 
     textured_maps.save(folder / "0.npz", chunk(["apple", "wall"], [0, 2], [4, 5], [1.0, 0.01]))
     textured_maps.save(folder / "1.npz", chunk(["table"], [1], [5], [0.1]))
     n = 3
-    casters.save(folder / "casters.npz", casters.Casters(
-        centre=np.zeros(3), scale=1.0, V=np.zeros((3, 3)), UV=np.zeros((3, 2)), F=np.array([[0, 1, 2]], np.int32),
-        face_surface=np.zeros(1, np.int32), area=np.ones(n), extent=np.ones((n, 2)), sag=np.zeros(n),
-        is_planar=np.ones(n, bool), is_closed=np.zeros((n, 2), bool), is_collapsed=np.zeros((n, 4), bool),
-        shell=np.full(n, -1, np.int32), borders=np.zeros((0, 5), np.int32)))
-    return ["--maps", str(folder / "0.npz"), str(folder / "1.npz"), "--casters", str(folder / "casters.npz"),
-            "--out", str(folder / "textures.npz"), "--table", str(folder / "budget.json")]
+    casters.save(
+        folder / "casters.npz",
+        casters.Casters(
+            centre=np.zeros(3),
+            scale=1.0,
+            V=np.zeros((3, 3)),
+            UV=np.zeros((3, 2)),
+            F=np.array([[0, 1, 2]], np.int32),
+            face_surface=np.zeros(1, np.int32),
+            area=np.ones(n),
+            extent=np.ones((n, 2)),
+            sag=np.zeros(n),
+            is_planar=np.ones(n, bool),
+            is_closed=np.zeros((n, 2), bool),
+            is_collapsed=np.zeros((n, 4), bool),
+            shell=np.full(n, -1, np.int32),
+            borders=np.zeros((0, 5), np.int32),
+        ),
+    )
+    return [
+        "--maps",
+        str(folder / "0.npz"),
+        str(folder / "1.npz"),
+        "--casters",
+        str(folder / "casters.npz"),
+        "--out",
+        str(folder / "textures.npz"),
+        "--table",
+        str(folder / "budget.json"),
+    ]
 
 
 def run(folder, options, **settings):
     status = budget_reduce.main([*options, "--settings", json.dumps(settings)])
-    return status, *((textured_maps.load(folder / "textures.npz"), read_json(folder / "budget.json")) if status == 0
-                     else (None, None))
+    return status, *(
+        (textured_maps.load(folder / "textures.npz"), read_json(folder / "budget.json"))
+        if status == 0
+        else (None, None)
+    )
 
 
 FULL = budget.gpu_bytes(17, 17) + 2 * budget.gpu_bytes(33, 33)
