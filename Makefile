@@ -71,7 +71,7 @@ setup:  ## only create .venv from requirements.lock and check the system's libra
 	        exit 1
 	    fi
 	    if [ -e .venv ]; then say "Remaking .venv: it is incomplete, or made for another folder or lock file."; fi
-	    say "Setting up .venv with $$("$$python" --version): about 115 packages, 370 MB to download the first time."
+	    say "Setting up .venv with $$("$$python" --version): 114 packages, 270 MB to download the first time."
 	    rm -rf .venv
 	    "$$python" -m venv .venv
 	    pip() { .venv/bin/python -m pip --disable-pip-version-check --no-input "$$@"; }

@@ -1,7 +1,7 @@
 """The source files a stage's result depends on: the stage and every module of lib that it reaches.
 
-Snakemake re-runs a rule for an edit in its code only if the code is among its inputs. `stage_code` follows the imports by
-reading the sources, so an edit re-runs the stages that reach the edited module and no others, and nothing is imported.
+Snakemake re-runs a rule for an edit in its code only if the code is among its inputs. `stage_code` follows the imports
+by reading the sources, so an edit re-runs the stages that reach the edited module and no others; nothing is imported.
 """
 
 import ast
@@ -45,7 +45,7 @@ def imported_modules(source, package):
     return names
 
 
-@functools.lru_cache(maxsize=None)
+@functools.cache
 def _read(root, path, stamp):
     """Text of a file and the names it imports; stamp is (mtime, size), so that an edited file is read anew."""
     with open(os.path.join(root, path), encoding="utf-8") as file:
@@ -54,7 +54,7 @@ def _read(root, path, stamp):
 
 
 def _files_reached(path, root):
-    """Files one module depends on directly, relative to root: modules it imports, data files beside it that it names."""
+    """Files one module depends on directly, relative to root: modules it imports, data files beside it."""
     status = os.stat(os.path.join(root, path))
     source, names = _read(root, path, (status.st_mtime_ns, status.st_size))
     files = set()
@@ -77,11 +77,13 @@ def _module_files(parts, root):
 
 
 def _data_files(path, source, root):
-    """Files that are not Python, beside a module or in a folder beside it, whose name its source mentions."""
+    """Files that are not Python, beside a module or in a folder beside it, whose name stands quoted in its source."""
     folder = os.path.dirname(path)
     with os.scandir(os.path.join(root, folder)) as entries:
         for entry in entries:
-            if entry.name.endswith(".py") or entry.name.startswith((".", "__")) or entry.name not in source:
+            if entry.name.endswith(".py") or entry.name.startswith((".", "__")):
+                continue
+            if f'"{entry.name}"' not in source and f"'{entry.name}'" not in source:
                 continue
             if entry.is_file():
                 yield os.path.join(folder, entry.name)
