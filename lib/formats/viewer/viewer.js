@@ -122,8 +122,9 @@ async function start() {
   new ResizeObserver(draw).observe(canvas);
   home();
   show();
-  // For tests: what is drawn, and the colour of a pixel (x right, y down, in CSS pixels of the canvas).
-  window.viewer = {
+  // For tests: what is drawn, and the colour of a pixel (x right, y down, in CSS pixels of the canvas); in the page's
+  // own attributes too, for a browser that only dumps the page.
+  const viewer = {
     levels: counts, textures: shared.size,
     pixel(x, y) {
       draw();
@@ -134,6 +135,10 @@ async function start() {
       return [...rgba.slice(0, 3)];
     },
   };
+  window.viewer = viewer;
+  box.dataset.triangles = counts.join(" ");
+  box.dataset.textures = shared.size;
+  box.dataset.centre = viewer.pixel(canvas.clientWidth / 2, canvas.clientHeight / 2).join(" ");
 }
 
 start().catch((error) => { output.textContent = `The 3D view does not start here: ${error.message}`; window.viewerError = String(error); });
