@@ -1,0 +1,421 @@
+"""The scenes in data/scenes: they import, face the right way, touch what they stand on, and name their sources."""
+
+import re
+import runpy
+import shutil
+from functools import cache
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from lib.formats import pictures, scene_folder, scene_geometry, scene_import, scene_rules, scene_table
+from lib.maps.base_texture import evaluate_picture
+from lib.nurbs.evaluate import evaluate, evaluate_grid, frame
+from lib.nurbs.shape import area, collapsed_sides, is_closed
+
+SCENES = Path(__file__).parents[1] / "data" / "scenes"
+NAMES = ("fruit_room", "monet_room", "jussi_car", "cornell")
+FLOAT, SINK = 2e-5, 2e-4  # an object may hang 0.02 mm above what it stands on, or sink 0.2 mm into it: neither shows
+GAUSS = np.polynomial.legendre.leggauss(8)  # exact for polynomials of degree 15 in each knot span
+
+
+@cache
+def load(name):
+    """(settings, Scene) of a scene folder, as a bake reads it."""
+    folder = scene_folder.read(SCENES / name)
+    scene_rules.check(folder)
+    settings = folder.settings
+    placed, notes = scene_geometry.load(settings["geometry"], settings["units"], folder.folder, folder.file)
+    table = scene_table.resolve(settings, placed, folder.where)
+    return settings, scene_import.assemble(placed, notes, table, settings["up"])
+
+
+def surfaces(name, pattern):
+    """(surface, flip) of the surfaces whose whole name matches a regular expression; at least one."""
+    scene = load(name)[1]
+    found = [
+        (surface, flip)
+        for full, surface, flip in zip(scene.names, scene.surfaces, scene.flip, strict=True)
+        if re.fullmatch(pattern, full)
+    ]
+    assert found, f"{name}: nothing is called {pattern}"
+    return found
+
+
+def surface(name, pattern):
+    [(one, _)] = surfaces(name, pattern)
+    return one
+
+
+def nodes(knots):
+    """Gauss nodes and weights over every knot span of [0, 1]."""
+    spans = np.unique(np.concatenate([knots[(knots > 0) & (knots < 1)], [0, 1]]))
+    pairs = [((a + b) / 2 + (b - a) / 2 * GAUSS[0], (b - a) / 2 * GAUSS[1]) for a, b in pairwise(spans)]
+    return np.concatenate([x for x, _ in pairs]), np.concatenate([w for _, w in pairs])
+
+
+def volume(parts):
+    """Signed volume within surfaces, 1/3 of the integral of S . N dA: > 0 where the lit side is outside."""
+    total = 0.0
+    centre = np.mean([evaluate(s, [0.5], [0.5])[0][0] for s, _ in parts], axis=0)
+    for s, flip in parts:
+        (u, w_u), (v, w_v) = nodes(s.knots_u), nodes(s.knots_v)
+        S, S_u, S_v = evaluate_grid(s, u, v)
+        flux = np.einsum("jik,jik->ji", S - centre, np.cross(S_u, S_v))
+        total += (-1 if flip else 1) * float(w_v @ flux @ w_u) / 3
+    return total
+
+
+def points(s, n=257):
+    """Points on an n x n grid of parameters, (n n, 3)."""
+    t = np.linspace(0, 1, n)
+    return evaluate_grid(s, t, t)[0].reshape(-1, 3)
+
+
+def lowest(*parts):
+    """Least z over surfaces: the best of a grid of parameters, three times refined about it."""
+    return min(_lowest(s) for s in parts)
+
+
+def _lowest(s):
+    u = v = np.linspace(0, 1, 257)
+    for _ in range(4):
+        z = evaluate_grid(s, u, v)[0][..., 2]
+        j, i = np.unravel_index(z.argmin(), z.shape)
+        u = np.linspace(u[max(i - 1, 0)], u[min(i + 1, len(u) - 1)], 33)
+        v = np.linspace(v[max(j - 1, 0)], v[min(j + 1, len(v) - 1)], 33)
+    return float(z.min())
+
+
+def signed_distances(P, s, flip=False):
+    """Distance of points to a closed surface, < 0 within it: nearest sample, then Gauss-Newton on (u, v)."""
+    t = np.linspace(0, 1, 201)
+    v, u = (a.ravel() for a in np.meshgrid(t, t, indexing="ij"))
+    near = cKDTree(points(s, 201)).query(P)[1]
+    u, v = u[near], v[near]
+    for _ in range(12):
+        S, S_u, S_v = evaluate(s, u, v)
+        r = P - S
+        a, b, c = ((x * y).sum(axis=1) for x, y in ((S_u, S_u), (S_u, S_v), (S_v, S_v)))
+        f, g = (S_u * r).sum(axis=1), (S_v * r).sum(axis=1)
+        det = np.maximum(a * c - b * b, 1e-12 * a * c + 1e-300)
+        u, v = np.clip(u + 0.8 * (c * f - b * g) / det, 0, 1), np.clip(v + 0.8 * (a * g - b * f) / det, 0, 1)
+    S, N = frame(s, u, v)
+    r = P - S
+    side = (r * N).sum(axis=1) * (-1 if flip else 1)
+    return np.where(side < 0, -1, 1) * np.linalg.norm(r, axis=1)
+
+
+def gap(a, b, reach=0.004):
+    """Smallest signed distance of surface a to the closed surface b, over the points of a within reach of b."""
+    P = points(a)
+    rough = cKDTree(points(b, 129)).query(P)[0]
+    close = rough < max(reach, 1.5 * rough.min())
+    return float(signed_distances(P[close], b).min())
+
+
+# Every scene
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_imports_without_a_warning_that_matters(name):
+    settings, scene = load(name)
+    assert (scene.E.max(axis=1) > 0).any()
+    assert all("skipped" in warning for warning in scene.warnings), scene.warnings
+    assert "camera" in settings
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_file_is_there_with_its_licence(name):
+    folder, (settings, _) = SCENES / name, load(name)
+    used = {entry["file"] for entry in settings["geometry"] if "file" in entry}
+    used |= {material["texture"] for material in settings["materials"].values() if "texture" in material}
+    rows = [line for line in (folder / "README.md").read_text("utf-8").splitlines() if line.startswith("| `")]
+    named = {file: row for row in rows for file in re.findall(r"`([^`]+)`", row.split("|")[1])}
+    present = {path.name for path in folder.iterdir() if path.is_file()}
+    assert used <= present
+    for file in present - {"README.md", "make_fruit.py"} - ({"scene.yaml"} - set(named)):
+        assert file in named, f"{file} has no row in README.md"
+    for file in used:
+        licences = [row for row in rows if f"`{file}`" in row.split("|")[1] and row.count("|") == 4]
+        assert licences and re.search("MIT|CC|public domain|this repository", licences[-1]), file
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_reflectances_are_those_of_real_things(name):
+    for material, given in load(name)[0]["materials"].items():
+        if "reflectance" in given and not {"lumens", "emission"} & set(given):
+            mean = np.mean(given["reflectance"])
+            assert 0.05 <= mean <= 0.85, material
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_rooms_face_inwards(name):
+    _, scene = load(name)
+    y_up = scene.up == "y"
+    low, high = (f(np.concatenate([points(s, 5) for s in scene.surfaces]), axis=0) for f in (np.min, np.max))
+    middle = (low + high) / 2
+    for full, s, flip in zip(scene.names, scene.surfaces, scene.flip, strict=True):
+        if re.fullmatch("floor|ceiling|.*_?wall(_.*)?|wall_.*", full):
+            S, N = frame(s, [0.5], [0.5])
+            assert ((middle - S[0]) @ N[0]) * (-1 if flip else 1) > 0, full
+        if full == "floor":
+            assert abs(N[0][1 if y_up else 2]) == pytest.approx(1)
+
+
+# Pictures
+
+
+@pytest.mark.parametrize(
+    ("name", "texture", "size"),
+    [
+        ("water_lilies", "water-lilies-1919-2.jpg", (1600, 1052)),
+        ("starry_night", "starry_night.jpg", (1024, 640)),
+        ("letters", "AtoZ.bmp", (512, 512)),
+    ],
+)
+def test_pictures_are_upright_and_not_mirrored(name, texture, size):
+    settings, scene = load("monet_room")
+    [(picture, flip)] = surfaces("monet_room", name)
+    assert settings["materials"][scene.material[scene.names.index(name)]]["texture"] == texture
+    rho = pictures.read_linear(SCENES / "monet_room" / texture, "srgb")
+    assert rho.shape[:2] == size[::-1]
+    _, S_u, S_v = (a[0] for a in evaluate(picture, [0.5], [0.5]))
+    towards_viewer = np.cross(S_u, S_v)
+    assert not flip
+    assert S_v[2] > 0 and np.allclose(S_v[:2], 0)  # v up
+    assert np.allclose(np.cross([0, 0, 1], towards_viewer / np.linalg.norm(towards_viewer)), S_u / np.linalg.norm(S_u))
+    width, height = np.linalg.norm(S_u), np.linalg.norm(S_v)
+    assert width / height == pytest.approx(size[0] / size[1], rel=2e-3)  # not stretched
+    room = np.array([3.5, 2.5, 1.6])
+    assert (room - evaluate(picture, [0.5], [0.5])[0][0]) @ towards_viewer > 0
+    assert rho.min() >= 0 and rho.max() <= 1
+
+
+def test_letters_begin_with_a_in_the_upper_left_corner():
+    rho = evaluate_picture(pictures.read_linear(SCENES / "monet_room" / "AtoZ.bmp"), (1, 1), 65, 65)
+    assert rho[63, 1] == pytest.approx([1, 0, 0], abs=0.01)  # A: blue on red, at u = 0, v = 1
+    assert rho[63, 63] == pytest.approx(3 * [rho[63, 63, 0]], abs=0.01)  # H on grey
+    assert rho[1, 1] == pytest.approx([1, 1, 0], abs=0.01)  # q: red on yellow
+
+
+def test_frames_close_round_their_pictures():
+    for name in ("water_lilies", "starry_night", "letters"):
+        frame_parts = surfaces("monet_room", f"{name}_frame_.*")
+        assert len(frame_parts) == 12
+        corners = np.concatenate([points(s, 2) for s, _ in frame_parts]).round(9)
+        _, times = np.unique(corners, axis=0, return_counts=True)
+        assert sorted(times) == [2] * 8 + [4] * 8  # wall and picture corners, corners of the front
+        # wall, frame and picture: a closed body but for its back
+        assert volume([*frame_parts, *surfaces("monet_room", name)]) > 0
+
+
+# Closed things
+
+
+CLOSED = [
+    ("fruit_room", "apple/1", 229.6e-6),
+    ("fruit_room", "apple/2", 0.1251e-6),
+    ("fruit_room", "apple_in_bowl/1", 229.6e-6),
+    ("fruit_room", "green_apple_in_bowl/1", 229.6e-6 * 0.95**3),
+    ("fruit_room", "pear/1", 213.7e-6),
+    ("fruit_room", "pear/2", 0.16166e-6),
+    ("fruit_room", "pear_in_bowl/1", 213.7e-6 * 0.97**3),
+    ("fruit_room", "banana/1", 115.9e-6),
+    ("fruit_room", "bowl/1", 539.5e-6),
+    ("fruit_room", "globe/1", 4 / 3 * np.pi * 0.11**3),
+    ("fruit_room", "duck/1", 10.6273 * 0.0407**3),
+    ("monet_room", "head_right/10", 612.256e-9 * 20**3),
+    ("monet_room", "head_left/06", 617.607e-9 * 20**3),
+]
+
+
+@pytest.mark.parametrize(("name", "pattern", "expected"), CLOSED)
+def test_closed_objects_are_closed_and_face_outwards(name, pattern, expected):
+    [(s, flip)] = surfaces(name, pattern)
+    assert sum(is_closed(s)) == 1
+    assert sum(collapsed_sides(s)) == 2
+    assert volume([(s, flip)]) == pytest.approx(expected, rel=2e-3)
+
+
+def test_sphere_is_exact():
+    s = surface("fruit_room", "globe/1")
+    centre = (points(s).max(axis=0) + points(s).min(axis=0)) / 2
+    assert np.abs(np.linalg.norm(points(s) - centre, axis=1) - 0.11).max() < 1e-12
+    assert volume([(s, False)]) == pytest.approx(4 / 3 * np.pi * 0.11**3, rel=1e-7)
+    assert area(s) == pytest.approx(4 * np.pi * 0.11**2, rel=1e-6)
+
+
+def test_own_surfaces_have_exact_seams_and_poles():
+    for pattern in ("(apple|pear)/.", "banana/1", "bowl/1", "globe/1"):
+        for s, _ in surfaces("fruit_room", pattern):
+            assert np.array_equal(s.Pw[0], s.Pw[-1])
+            assert np.ptp(s.P[:, [0, -1]], axis=0).max() < 1e-15
+
+
+def test_boxes_have_their_volume():
+    assert volume(surfaces("fruit_room", "table_.*")) == pytest.approx(1.0 * 0.7 * 0.035)
+    assert volume(surfaces("fruit_room", "floor|ceiling|wall_.*")) == pytest.approx(-5 * 4 * 2.8)
+    assert volume(surfaces("monet_room", "floor|ceiling|wall_.*")) == pytest.approx(-7 * 5 * 3.2)
+    assert volume(surfaces("monet_room", "seat_.*")) == pytest.approx(1.6 * 0.4 * 0.06)
+
+
+def test_teapot_faces_outwards():
+    parts = surfaces("fruit_room", "teapot/.*")
+    assert len(parts) == 32 and not any(flip for _, flip in parts)
+    tubes = {"13": 16, "17": 20}
+    for first, last in tubes.items():  # handle, spout
+        assert volume(parts[int(first) - 1 : last]) > 0
+    size = np.ptp(np.concatenate([points(s, 65) for s, _ in parts]), axis=0)
+    assert 0.17 < np.hypot(size[0], size[1]) < 0.24  # 20 cm from handle to spout, turned
+    body = [parts[k] for k in (*range(12), *range(20, 32))]
+    assert volume(body) == pytest.approx(0.75e-3, rel=0.02)  # a pot of three quarters of a litre
+
+
+def test_duck_faces_outwards():
+    beaks = surfaces("fruit_room", "duck/[23]")
+    assert [flip for _, flip in surfaces("fruit_room", "duck/.")] == [True, True, False]
+    body = surface("fruit_room", "duck/1")
+    head = points(body).max(axis=0)[2]
+    for s, flip in beaks:
+        assert volume([(s, flip)]) > 0  # a bent sheet around the beak's inside
+        assert points(s)[:, 2].max() < head
+
+
+# What stands on what
+
+
+@pytest.mark.parametrize("pattern", ["bowl/1", "apple/1", "pear/1", "banana/1", "duck/1", "teapot/.*"])
+def test_still_life_stands_on_the_table(pattern):
+    top = points(surface("fruit_room", "table_top"), 2)[:, 2].max()
+    clearance = lowest(*(s for s, _ in surfaces("fruit_room", pattern))) - top
+    assert -SINK < clearance < FLOAT
+    P = np.concatenate([points(s, 33) for s, _ in surfaces("fruit_room", pattern)])
+    assert (P[:, :2] > [1.8, 1.75]).all() and (P[:, :2] < [2.8, 2.45]).all()  # within the table's edge
+
+
+def test_things_on_the_table_stand_apart():
+    groups = [
+        np.concatenate([points(s, 65) for s, _ in surfaces("fruit_room", pattern)])
+        for pattern in ("bowl/1", "teapot/.*", "duck/.", "apple/.", "pear/.", "banana/1")
+    ]
+    for index, P in enumerate(groups):
+        for Q in groups[:index]:
+            assert cKDTree(P).query(Q)[0].min() > 0.005
+
+
+def test_fruit_in_the_bowl_rests_on_the_bowl_and_each_other():
+    bowl = surface("fruit_room", "bowl/1")
+    fruit = [surface("fruit_room", f"{name}/1") for name in ("apple_in_bowl", "green_apple_in_bowl", "pear_in_bowl")]
+    for index, s in enumerate(fruit):
+        gaps = [gap(s, other) for other in (bowl, *fruit[:index])]
+        assert min(gaps) > -SINK
+        assert min(gaps) < FLOAT
+
+
+def test_stems_stand_in_their_fruit():
+    for name in ("apple", "pear", "apple_in_bowl", "green_apple_in_bowl", "pear_in_bowl"):
+        body, stem = surface("fruit_room", f"{name}/1"), surface("fruit_room", f"{name}/2")
+        distance = signed_distances(points(stem, 33), body)
+        assert distance.min() < 0 < distance.max()
+
+
+def test_table_legs_and_lamps_meet_what_holds_them():
+    for leg, _ in surfaces("fruit_room", r"leg\.\d/1"):
+        z = points(leg, 9)[:, 2]
+        assert z.min() == 0 and z.max() == pytest.approx(0.705, abs=1e-12)
+    cord, globe = points(surface("fruit_room", "cord/1"), 9)[:, 2], points(surface("fruit_room", "globe/1"))[:, 2]
+    assert cord.max() == pytest.approx(2.8, abs=1e-12)
+    assert cord.min() == pytest.approx(globe.max(), abs=1e-12)
+    for name, patterns, height in (("fruit_room", "panel_.*", 2.8), ("monet_room", "lamp_.*_.*", 3.2)):
+        for s, _ in surfaces(name, patterns):
+            assert points(s, 2)[:, 2].max() == pytest.approx(height, abs=1e-12)
+
+
+@pytest.mark.parametrize(("side", "number"), [("right", "10"), ("left", "06")])
+def test_heads_sit_on_their_plinths(side, number):
+    top = points(surface("monet_room", f"plinth_{side}_top"), 2)[:, 2].max()
+    neck, head = surface("monet_room", f"neck_{side}"), surface("monet_room", f"head_{side}/{number}")
+    assert lowest(neck) == pytest.approx(top, abs=1e-12)
+    assert lowest(surface("monet_room", f"plinth_{side}_front")) == 0
+    assert lowest(head) - top == pytest.approx(0.045, abs=1e-3)
+    t = np.linspace(0, 1, 65)
+    rim = evaluate(neck, t, np.ones_like(t))[0]
+    assert signed_distances(rim, head).max() < 0  # the open upper end is inside the head
+    assert 0.25 < np.ptp(points(head)[:, 2]) < 0.28
+
+
+def test_bench_stands():
+    assert lowest(*(s for s, _ in surfaces("monet_room", "block_.*"))) == 0
+    below = points(surface("monet_room", "seat_below"), 2)[:, 2]
+    for s, _ in surfaces("monet_room", "block_.*"):
+        assert points(s, 2)[:, 2].max() == pytest.approx(below.max(), abs=1e-12)
+
+
+# The craft
+
+
+def test_speeder_stands_on_the_floor_and_casts_only():
+    settings, scene = load("jussi_car")
+    assert settings["bake"]["bounces"] == 1
+    assert [role for name, role in zip(scene.names, scene.role, strict=True) if name.startswith("speeder")] == [
+        "cast_only",
+        "cast_only",
+    ]
+    hull = surfaces("jussi_car", "speeder/.")
+    assert volume(hull) > 0
+    size = np.ptp(np.concatenate([points(s) for s, _ in hull]), axis=0)
+    assert 1.2 < size[2] < 1.3 and 3 < size[0] < 5
+    t = np.linspace(0, 1, 33)
+    for s, _ in hull:
+        assert np.abs(points(s)[:, 2].min()) < 1e-12
+        assert np.abs(evaluate(s, np.ones_like(t), t)[0][:, 2]).max() < 1e-12
+
+
+# The Cornell box
+
+
+def test_cornell_has_the_published_area():
+    _, scene = load("cornell")
+    areas = dict(zip(scene.names, (area(s) for s in scene.surfaces), strict=True))
+    assert len(areas) == 16
+    # the file has the right face of the short box and the front face of the tall one twice
+    assert sum(areas.values()) + areas["short_box_right"] + areas["tall_box_front"] == pytest.approx(26.5477, abs=1e-4)
+
+
+def test_cornell_boxes_face_outwards_and_stand():
+    for box, size in (("short_box", (0.36125 * 0.6)), ("tall_box", (0.363 * 1.2))):
+        parts = surfaces("cornell", f"{box}_.*")
+        assert len(parts) == 5
+        for s, flip in parts:
+            S, N = frame(s, [0.5], [0.5])
+            middle = np.mean([evaluate(other, [0.5], [0.5])[0][0] for other, _ in parts], axis=0)
+            assert not flip and (S[0] - middle) @ N[0] > 0
+        assert min(points(s, 2)[:, 1].min() for s, _ in parts) == 0
+        top = surface("cornell", f"{box}_top")
+        assert area(top) * points(top, 2)[:, 1].max() == pytest.approx(size, rel=1e-9)
+
+
+def test_cornell_light_is_pi_times_the_radiance():
+    _, scene = load("cornell")
+    index = scene.names.index("light")
+    assert scene.E[index] == pytest.approx(np.pi * np.array([17, 12, 4]), rel=1e-9)
+    assert scene.is_black[index]
+    assert points(surface("cornell", "light"), 2)[:, 1].max() == 1.98
+
+
+# The script
+
+
+def test_make_fruit_writes_the_same_bytes(tmp_path):
+    for path in (SCENES / "fruit_room").iterdir():
+        if path.suffix in (".py", ".ctrlpts", ".weights"):
+            shutil.copy(path, tmp_path)
+    runpy.run_path(str(tmp_path / "make_fruit.py"), run_name="__main__")
+    written = sorted(tmp_path.glob("*.json"))
+    assert len(written) == 8
+    for path in written:
+        assert path.read_bytes() == (SCENES / "fruit_room" / path.name).read_bytes(), path.name
