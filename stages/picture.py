@@ -19,7 +19,9 @@ from lib.report import picture
 def arguments(parser):
     parser.add_argument("--gltf", required=True, help="exported .gltf or .glb")
     parser.add_argument("--out", required=True, help="PNG to write")
-    parser.add_argument("--camera", default="auto", help='JSON {"eye": [x, y, z], "target": [x, y, z], "fov": 50} or auto')
+    parser.add_argument(
+        "--camera", default="auto", help='JSON {"eye": [x, y, z], "target": [x, y, z], "fov": 50} or auto'
+    )
     parser.add_argument("--size", default="960x600", help="width x height in pixels")
     parser.add_argument("--samples", type=int, default=2, help="rays a pixel, per direction")
     parser.add_argument("--edges", type=float, default=0.0, help="share by which triangle edges are darkened")
@@ -31,8 +33,10 @@ def body(args, cost):
         if not (0 < width <= 8192 and 0 < height <= 8192 and 1 <= args.samples <= 8):
             raise ValueError
     except ValueError:
-        raise Refusal(f"--size {args.size}, --samples {args.samples}: expected like 960x600, up to 8192 a side, "
-                      "and 1 to 8 samples") from None
+        raise Refusal(
+            f"--size {args.size}, --samples {args.samples}: expected like 960x600, up to 8192 a side, "
+            "and 1 to 8 samples"
+        ) from None
     parts, textures = exported.load(args.gltf)
     model = picture.join(parts)
     view = _camera(args.camera) or cameras.automatic(model)

@@ -109,9 +109,13 @@ def _matrix(node):
     if "matrix" in node:
         return np.array(node["matrix"], float).reshape(4, 4).T
     x, y, z, w = node.get("rotation", (0, 0, 0, 1))
-    rotation = np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-                         [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-                         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)]])
+    rotation = np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
     matrix = np.eye(4)
     matrix[:3, :3] = rotation * np.array(node.get("scale", (1, 1, 1)), float)
     matrix[:3, 3] = node.get("translation", (0, 0, 0))
@@ -121,8 +125,9 @@ def _matrix(node):
 def _part(document, buffers, primitive, matrix, name):
     attributes = primitive["attributes"]
     V = _accessor(document, buffers, attributes["POSITION"]) @ matrix[:3, :3].T + matrix[:3, 3]
-    F = (_accessor(document, buffers, primitive["indices"])[:, 0] if "indices" in primitive
-         else np.arange(len(V))).reshape(-1, 3)
+    F = (
+        _accessor(document, buffers, primitive["indices"])[:, 0] if "indices" in primitive else np.arange(len(V))
+    ).reshape(-1, 3)
     if np.linalg.det(matrix[:3, :3]) < 0:
         F = F[:, ::-1]
     colour = _accessor(document, buffers, attributes["COLOR_0"])[:, :3] if "COLOR_0" in attributes else None
@@ -133,8 +138,16 @@ def _part(document, buffers, primitive, matrix, name):
     if slot is not None:
         ST = _accessor(document, buffers, attributes[f"TEXCOORD_{slot.get('texCoord', 0)}"])
         ST = _transformed(ST, slot.get("extensions", {}).get("KHR_texture_transform", {}))
-    return Part(V, F, ST, colour, tuple(base.get("baseColorFactor", (1, 1, 1, 1))[:3]),
-                -1 if slot is None else slot["index"], bool(material.get("doubleSided")), name)
+    return Part(
+        V,
+        F,
+        ST,
+        colour,
+        tuple(base.get("baseColorFactor", (1, 1, 1, 1))[:3]),
+        -1 if slot is None else slot["index"],
+        bool(material.get("doubleSided")),
+        name,
+    )
 
 
 def _transformed(st, how):

@@ -1,6 +1,6 @@
 """Small drawings of the report as SVG text, by hand: they follow the page's light or dark colours.
 
-matplotlib was measured for the one curve of the report: 0.72 s wall, 0.8 s of a core, for the import and one small plot,
+matplotlib was measured for the one curve of the report: 0.7 s wall, 0.8 s of a core, for its import and one small plot,
 against less than a millisecond here. A retune of the levels of detail is to take seconds, so it is left out.
 """
 
@@ -33,23 +33,33 @@ def convergence(shots, unshot, target=None):
     parts = [f'<svg class="chart" viewBox="0 0 {width} {height}" role="img" aria-label="Unshot power over shots">']
     for power in range(low, high + 1):
         y = py(10.0**power)
-        parts.append(f'<line class="grid" x1="{left}" x2="{width - right}" y1="{y:.1f}" y2="{y:.1f}"/>'
-                     f'<text class="tick" x="{left - 8}" y="{y + 4:.1f}" text-anchor="end">{_power(power)}</text>')
+        parts.append(
+            f'<line class="grid" x1="{left}" x2="{width - right}" y1="{y:.1f}" y2="{y:.1f}"/>'
+            f'<text class="tick" x="{left - 8}" y="{y + 4:.1f}" text-anchor="end">{_power(power)}</text>'
+        )
     for x in _ticks(x_end):
-        parts.append(f'<line class="grid" x1="{px(x):.1f}" x2="{px(x):.1f}" y1="{height - foot}" '
-                     f'y2="{height - foot + 4}"/><text class="tick" x="{px(x):.1f}" y="{height - foot + 17}" '
-                     f'text-anchor="middle">{x:,.0f}</text>')
+        parts.append(
+            f'<line class="grid" x1="{px(x):.1f}" x2="{px(x):.1f}" y1="{height - foot}" '
+            f'y2="{height - foot + 4}"/><text class="tick" x="{px(x):.1f}" y="{height - foot + 17}" '
+            f'text-anchor="middle">{x:,.0f}</text>'
+        )
     if target:
-        parts.append(f'<line class="target" x1="{left}" x2="{width - right}" y1="{py(target):.1f}" y2="{py(target):.1f}"/>'
-                     f'<text class="tick target" x="{width - right}" y="{py(target) - 5:.1f}" text-anchor="end">'
-                     f'stop at {target:g}</text>')
+        parts.append(
+            f'<line class="target" x1="{left}" x2="{width - right}" y1="{py(target):.1f}" y2="{py(target):.1f}"/>'
+            f'<text class="tick target" x="{width - right}" y="{py(target) - 5:.1f}" text-anchor="end">'
+            f"stop at {target:g}</text>"
+        )
     line = " ".join(f"{px(x):.1f},{py(y):.1f}" for x, y in points)
     parts.append(f'<polyline class="curve" points="{line}"/>')
     if len(points) <= 120:
-        parts += [f'<circle class="dot" cx="{px(x):.1f}" cy="{py(y):.1f}" r="3"><title>{x:,.0f} shots: {y:.3g}</title>'
-                  "</circle>" for x, y in points]
-    parts.append(f'<text class="tick" x="{(left + width - right) / 2}" y="{height - 4}" text-anchor="middle">shots</text>'
-                 "</svg>")
+        parts += [
+            f'<circle class="dot" cx="{px(x):.1f}" cy="{py(y):.1f}" r="3"><title>{x:,.0f} shots: {y:.3g}</title>'
+            "</circle>"
+            for x, y in points
+        ]
+    parts.append(
+        f'<text class="tick" x="{(left + width - right) / 2}" y="{height - 4}" text-anchor="middle">shots</text></svg>'
+    )
     return "".join(parts)
 
 

@@ -2,8 +2,25 @@
 
 import math
 
-STAGES = ["import_scene", "tessellate", "sample", "shoot", "refine", "refine direct", "refine indirect", "balance_resample",
-          "apply_base_texture", "budget_reduce", "lod_export", "package", "report"]
+import numpy as np
+
+from lib.report import seams, surfaces
+
+STAGES = [
+    "import_scene",
+    "tessellate",
+    "sample",
+    "shoot",
+    "refine",
+    "refine direct",
+    "refine indirect",
+    "balance_resample",
+    "apply_base_texture",
+    "budget_reduce",
+    "lod_export",
+    "package",
+    "report",
+]
 SAVINGS = {
     "cast_only": ("surfaces that only cast shadows: no elements, no map", "surfaces"),
     "receive_only": ("surfaces that only receive: not in the shadow mesh", "surfaces"),
@@ -24,9 +41,20 @@ def stage_costs(costs, run):
     """
     rows = {}
     for c in costs:
-        row = rows.setdefault(c["stage"], {"stage": c["stage"], "jobs": 0, "seconds": 0.0, "cpu_seconds": 0.0,
-                                           "peak_mb": 0.0, "rays": 0, "rays_in_run": 0, "seconds_in_run": 0.0,
-                                           "jobs_in_run": 0})
+        row = rows.setdefault(
+            c["stage"],
+            {
+                "stage": c["stage"],
+                "jobs": 0,
+                "seconds": 0.0,
+                "cpu_seconds": 0.0,
+                "peak_mb": 0.0,
+                "rays": 0,
+                "rays_in_run": 0,
+                "seconds_in_run": 0.0,
+                "jobs_in_run": 0,
+            },
+        )
         is_in_run = bool(run) and c.get("run", "") == run
         row["jobs"] += 1
         for key in ("seconds", "cpu_seconds", "rays"):
@@ -56,8 +84,9 @@ def notes(costs):
 
 def savings(counted):
     """Rows {what, count, unit} of what was not computed; counted : {name of SAVINGS or any other: number}."""
-    known = [{"what": what, "count": counted[key], "unit": unit} for key, (what, unit) in SAVINGS.items()
-             if counted.get(key)]
+    known = [
+        {"what": what, "count": counted[key], "unit": unit} for key, (what, unit) in SAVINGS.items() if counted.get(key)
+    ]
     return known
 
 
@@ -76,8 +105,12 @@ def ledger(powers):
     base = next((sum(rgb[n]) for n in ("emitted", "received") if n in rgb and sum(rgb[n]) > 0), 0.0)
     order = ["emitted", "not received", "received", "absorbed", "escaped", "unshot", "residue"]
     names = [n for n in order if n in rgb] + sorted(n for n in rgb if n not in order)
-    labels = {"received": "received directly by elements", "residue": "quadrature residue: gathered less shot",
-              "not received": "not received: past all elements, and quadrature", "escaped": "escaped after a reflection"}
+    labels = {
+        "received": "received directly by elements",
+        "residue": "quadrature residue: gathered less shot",
+        "not received": "not received: past all elements, and quadrature",
+        "escaped": "escaped after a reflection",
+    }
     return [(labels.get(n, n.replace("_", " ")), rgb[n], sum(rgb[n]) / base if base else None) for n in names]
 
 
@@ -100,9 +133,16 @@ def budget_rows(table):
     rows = []
     for s in table["surfaces"]:
         if s["level_after"] < s["level_before"]:
-            rows.append({"name": s["surface"], "from": "{} \u00d7 {}".format(*s["size_before"]),
-                         "to": "{} \u00d7 {}".format(*s["size_after"]), "levels": s["level_before"] - s["level_after"],
-                         "saved": s["bytes_before"] - s["bytes_after"], "D_i": s["D_given_up"]})
+            rows.append(
+                {
+                    "name": s["surface"],
+                    "from": "{} \u00d7 {}".format(*s["size_before"]),
+                    "to": "{} \u00d7 {}".format(*s["size_after"]),
+                    "levels": s["level_before"] - s["level_after"],
+                    "saved": s["bytes_before"] - s["bytes_after"],
+                    "D_i": s["D_given_up"],
+                }
+            )
     return sorted(rows, key=lambda r: (-r["saved"], r["name"]))
 
 
@@ -124,6 +164,93 @@ def totals(stages, surfaces, levels, memory, unshot, error):
 
 def run_totals(stages, run):
     """Rays, seconds and jobs of the run alone."""
-    return {"id": run, "rays": sum(s["rays_in_run"] for s in stages),
-            "seconds": round(sum(s["seconds_in_run"] for s in stages), 3),
-            "jobs": sum(s["jobs_in_run"] for s in stages)}
+    return {
+        "id": run,
+        "rays": sum(s["rays_in_run"] for s in stages),
+        "seconds": round(sum(s["seconds_in_run"] for s in stages), 3),
+        "jobs": sum(s["jobs_in_run"] for s in stages),
+    }
+
+
+def level_rows(lods):
+    """The levels of lods.json with what the report shows of each."""
+    rows = []
+    for k, level in enumerate(lods["levels"]):
+        rows.append(
+            {
+                "level": k,
+                "file": level["file"],
+                "triangles": level["triangles"],
+                "vertices": level.get("vertices"),
+                "max_distance": level.get("max_distance"),
+                "rms_distance": level.get("rms_distance"),
+                "gap": level.get("gap"),
+                "coverage": level.get("screen_coverage"),
+                "bytes": level.get("bytes"),
+            }
+        )
+        rows[-1]["share"] = level["triangles"] / rows[0]["triangles"] if rows[0]["triangles"] else None
+        if level.get("mapped_triangles") is not None:
+            rows[-1]["mapped_triangles"] = level["mapped_triangles"]
+    return rows
+
+
+def counted(bake, rows):
+    """Savings by name, counted here or noted by the jobs."""
+    noted = notes([{"notes": facts} for facts in bake.tree_facts])
+    noted = {**noted, **{k: v for k, v in notes(bake.costs).items() if k in SAVINGS}}
+    return {
+        **noted,
+        "cast_only": sum(row["role"] == "cast_only" for row in rows),
+        "receive_only": sum(row["role"] == "receive_only" for row in rows),
+        "black": sum(row["is_black"] for row in rows),
+        "few_texels": sum(row["map"] is not None and row["map"] == [r + 1 for r in row["roots"]] for row in rows),
+    }
+
+
+def collect(name, bake, settings, run):
+    """The dict of report.json.
+
+    name : of the scene; bake : has the fields of lib.formats.bake_files.Bake
+    settings : {"settings": what the bake used or None, "warnings": [text]}; run : id of the run, "" for none
+    """
+    scene, solution = bake.scene, bake.solution
+    table = bake.budget or {"T": None, "S_before": None, "S_after": None, "surfaces": [], "profile": "standard"}
+    exported_maps = getattr(bake.textures, "light" if table["profile"] == "lightmap" else "final", None)
+    mean_H = float(np.mean(solution.mean_H)) if solution is not None else 0.0
+    rows = surfaces.rows(
+        scene, bake.trees, bake.maps, exported_maps, {s["surface"]: s["D"] for s in table["surfaces"]}, mean_H
+    )
+    for row, extent in zip(rows, bake.casters.extent, strict=True):
+        row["aspect"] = float(extent[0] / extent[1]) if extent[1] > 0 else None
+    stages = stage_costs(bake.costs, run)
+    levels = level_rows(bake.lods)
+    history = solution.history if solution is not None and len(solution.history) else np.zeros((0, 2))
+    memory = {"budget": table["T"], "before": table["S_before"], "after": table["S_after"], "disk": bake.disk_bytes}
+    unshot = float(history[-1, 1]) if len(history) else None
+    return {
+        "scene": name,
+        "version": 1,
+        "run": run_totals(stages, run),
+        "totals": totals(stages, rows, levels, memory, unshot, surfaces.overall_error(rows, bake.casters.area)),
+        "stages": stages,
+        "surfaces": rows,
+        "levels": levels,
+        "shoot": {
+            "shots": history[:, 0].tolist(),
+            "history": history[:, 1].tolist(),
+            "unshot": unshot,
+            "target": (settings.get("settings") or {}).get("bake", {}).get("convergence"),
+            "facts": solution.facts if solution is not None else {},
+        },
+        "ledger": ledger(solution.ledger) if solution is not None else [],
+        "memory": memory,
+        "budget": budget_rows(table),
+        "gouraud": gouraud([row["leaves"] for row in rows], levels),
+        "savings": savings(counted(bake, rows)),
+        "notes": notes(bake.costs),
+        "seams": seams.rows(bake.scene, bake.casters, bake.maps, mean_H),
+        "exposure": bake.lods.get("exposure"),
+        "settings": settings.get("settings"),
+        "warnings": [*scene.warnings, *settings.get("warnings", [])],
+    }

@@ -67,7 +67,9 @@ def join(parts):
     """Model of a list of Part."""
     starts = np.cumsum([0] + [len(p.V) for p in parts])
     V = np.concatenate([np.zeros((0, 3))] + [np.asarray(p.V, float) for p in parts])
-    F = np.concatenate([np.zeros((0, 3), int)] + [np.asarray(p.F, int) + s for p, s in zip(parts, starts, strict=False)])
+    F = np.concatenate(
+        [np.zeros((0, 3), int)] + [np.asarray(p.F, int) + s for p, s in zip(parts, starts, strict=False)]
+    )
     ST = np.concatenate([np.zeros((0, 2))] + [np.zeros((len(p.V), 2)) if p.ST is None else p.ST for p in parts])
     colour = None
     if any(p.colour is not None for p in parts):
@@ -94,7 +96,8 @@ def first_visible(model, origin, direction):
             break
         start = t[again] + step[again]
         more, face[again], weight[again] = closest.first_hits(
-            model.mesh, origin[again] + start[:, None] * direction[again], direction[again])
+            model.mesh, origin[again] + start[:, None] * direction[again], direction[again]
+        )
         t[again] = start + more
     else:
         t[again], face[again], weight[again] = np.inf, -1, 0.0
@@ -172,7 +175,7 @@ def _interpolated(corners, face, weight):
 
 
 def lookup(texture, st):
-    """Bilinear value (n, 3) at texture coordinates (n, 2): the sample at column i, row j sits at ((i+.5)/w, (j+.5)/h)."""
+    """Bilinear value (n, 3) at texture coordinates (n, 2): the sample of column i, row j is at ((i+.5)/w, (j+.5)/h)."""
     h, w = texture.rgb.shape[:2]
     x, y = st[:, 0] * w - 0.5, st[:, 1] * h - 0.5
     i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)

@@ -6,6 +6,9 @@ Conventions: maps [j, i] = [v row, u column]; sides 0 u=0, 1 u=1, 2 v=0, 3 v=1; 
 
 import numpy as np
 
+from lib.nurbs.evaluate import normal
+
+MOST = 20  # rows listed
 SMOOTH = np.cos(np.radians(10))  # neighbours whose normals differ less share light; over a sharper edge it may jump
 PROBES = 9  # points of a border at which normals are compared
 
@@ -42,6 +45,42 @@ def border_uv(side, is_reversed=False, n=PROBES):
     t = t[::-1] if is_reversed else t
     fixed = np.full(n, float(side in (1, 3)))
     return (fixed, t) if side in (0, 1) else (t, fixed)
+
+
+def rows(scene, casters, maps, mean_H):
+    """Steps of irradiance along borders that are smooth in space, the worst first: dicts a, b, worst, relative.
+
+    maps : MapSet of H (N, G, 3), or None; borders between surfaces without maps are left out
+    """
+    if maps is None:
+        return []
+    total, listed = {}, []
+    for a, side_a, b, side_b, is_reversed in casters.borders.tolist():
+        ka, kb = maps.position(a), maps.position(b)
+        if ka < 0 or kb < 0 or casters.is_collapsed[a, side_a] or casters.is_collapsed[b, side_b]:
+            continue
+        N = [
+            normal(scene.surfaces[s], *border_uv(side, turned)) * (-1 if scene.flip[s] else 1)
+            for s, side, turned in ((a, side_a, False), (b, side_b, bool(is_reversed)))
+        ]
+        if not is_smooth(*N):
+            continue
+        for k in (ka, kb):
+            if k not in total:
+                total[k] = maps.map(k).sum(axis=2)
+        worst = step(
+            line(total[ka], maps.hidden_map(ka), side_a), line(total[kb], maps.hidden_map(kb), side_b), is_reversed
+        )
+        if np.isfinite(worst):
+            listed.append(
+                {
+                    "a": scene.names[a],
+                    "b": scene.names[b],
+                    "worst": worst,
+                    "relative": worst / mean_H if mean_H > 0 else None,
+                }
+            )
+    return sorted(listed, key=lambda r: (-r["worst"], r["a"], r["b"]))[:MOST]
 
 
 def _read(value, hidden, n):

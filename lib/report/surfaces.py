@@ -26,26 +26,28 @@ def rows(scene, trees, maps, textures, D_i, mean_H):
         k, e = place[0].get(s), place[1].get(s)
         error = float(np.sqrt(sum(t.error**2 for t in own))) if own else None
         hidden = maps.hidden_map(k) if k is not None else None
-        listed.append({
-            "index": s,
-            "name": name,
-            "file": scene.files[s],
-            "role": scene.role[s],
-            "reconstruction": scene.reconstruction[s],
-            "material": scene.material[s],
-            "is_black": bool(scene.is_black[s]),
-            "is_light": bool(np.max(scene.E[s]) > 0),
-            "map": sizes[0][k].tolist() if k is not None else None,
-            "texture": sizes[1][e].tolist() if e is not None else None,
-            "roots": maps.roots[k].tolist() if k is not None else None,
-            "depth": depth(own) if own else int(maps.level[k]) if k is not None else None,
-            "leaves": overlay_count([leaves(t) for t in own], own[0].roots) if own else 0,
-            "samples": int(sum(len(t.ji) for t in own)),
-            "hidden": float(hidden.mean()) if hidden is not None else None,
-            "error": error / mean_H if error is not None and mean_H > 0 else None,
-            "D_i": D_i.get(name),
-            "bytes": gpu_bytes(*sizes[1][e].tolist()) if e is not None else None,
-        })
+        listed.append(
+            {
+                "index": s,
+                "name": name,
+                "file": scene.files[s],
+                "role": scene.role[s],
+                "reconstruction": scene.reconstruction[s],
+                "material": scene.material[s],
+                "is_black": bool(scene.is_black[s]),
+                "is_light": bool(np.max(scene.E[s]) > 0),
+                "map": sizes[0][k].tolist() if k is not None else None,
+                "texture": sizes[1][e].tolist() if e is not None else None,
+                "roots": maps.roots[k].tolist() if k is not None else None,
+                "depth": depth(own) if own else int(maps.level[k]) if k is not None else None,
+                "leaves": overlay_count([leaves(t) for t in own], own[0].roots) if own else 0,
+                "samples": int(sum(len(t.ji) for t in own)),
+                "hidden": float(hidden.mean()) if hidden is not None else None,
+                "error": error / mean_H if error is not None and mean_H > 0 else None,
+                "D_i": D_i.get(name),
+                "bytes": gpu_bytes(*sizes[1][e].tolist()) if e is not None else None,
+            }
+        )
     return listed
 
 

@@ -13,7 +13,9 @@ def thumbnail(value, hidden, exposure):
     Hidden samples are drawn in a dull violet that no lamp makes.
     """
     step = 1
-    while max((n - 1) // step + 1 for n in value.shape[:2]) > LARGEST and all((n - 1) % (2 * step) == 0 for n in value.shape[:2]):
+    while max((n - 1) // step + 1 for n in value.shape[:2]) > LARGEST and all(
+        (n - 1) % (2 * step) == 0 for n in value.shape[:2]
+    ):
         step *= 2
     codes = np.rint(255 * linear_to_srgb(np.asarray(value[::step, ::step], float) * exposure)).astype(np.uint8)
     codes[hidden[::step, ::step]] = (70, 40, 90)

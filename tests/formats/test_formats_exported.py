@@ -26,17 +26,23 @@ def document(uri, image):
         "scenes": [{"nodes": [0]}],
         "nodes": [{"name": "above", "translation": [0, 0, -2], "children": [1]}, {"name": "square", "mesh": 0}],
         "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_1": 1}, "indices": 2, "material": 0}]}],
-        "materials": [{"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1},
-                                                "baseColorFactor": [1, 1, 1, 1]}}],
+        "materials": [
+            {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1}, "baseColorFactor": [1, 1, 1, 1]}}
+        ],
         "textures": [{"source": 0, "sampler": 0}],
         "samplers": [{"wrapS": 33071, "wrapT": 33071}],
         "images": [image],
         "buffers": [{"byteLength": 92, **({"uri": uri} if uri else {})}],
-        "bufferViews": [{"buffer": 0, "byteLength": 48}, {"buffer": 0, "byteOffset": 48, "byteLength": 32},
-                        {"buffer": 0, "byteOffset": 80, "byteLength": 12}],
-        "accessors": [{"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 4},
-                      {"bufferView": 1, "componentType": 5126, "type": "VEC2", "count": 4},
-                      {"bufferView": 2, "componentType": 5123, "type": "SCALAR", "count": 6}],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": 48},
+            {"buffer": 0, "byteOffset": 48, "byteLength": 32},
+            {"buffer": 0, "byteOffset": 80, "byteLength": 12},
+        ],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "type": "VEC3", "count": 4},
+            {"bufferView": 1, "componentType": 5126, "type": "VEC2", "count": 4},
+            {"bufferView": 2, "componentType": 5123, "type": "SCALAR", "count": 6},
+        ],
     }
 
 

@@ -20,8 +20,16 @@ def test_tree_with_one_divided_corner():
     path, w, h = tree_lines(level, i, j, (1, 1))
     assert (w, h) == (4, 4)
     segments = set(re.findall(r"M(\d+) (\d+)([hv])(\d+)", path))
-    assert segments == {("0", "0", "h", "4"), ("0", "2", "h", "4"), ("0", "3", "h", "2"), ("0", "4", "h", "4"),
-                        ("0", "0", "v", "4"), ("1", "2", "v", "2"), ("2", "0", "v", "4"), ("4", "0", "v", "4")}
+    assert segments == {
+        ("0", "0", "h", "4"),
+        ("0", "2", "h", "4"),
+        ("0", "3", "h", "2"),
+        ("0", "4", "h", "4"),
+        ("0", "0", "v", "4"),
+        ("1", "2", "v", "2"),
+        ("2", "0", "v", "4"),
+        ("4", "0", "v", "4"),
+    }
 
 
 def test_a_full_tree_costs_two_lines_a_row():

@@ -6,13 +6,22 @@ from lib.report import figures
 
 
 def cost(stage, seconds, rays, run="now", **more):
-    return {"stage": stage, "seconds": seconds, "cpu_seconds": 2 * seconds, "peak_mb": 100 * seconds, "rays": rays,
-            "run": run, "notes": {}, **more}
+    return {
+        "stage": stage,
+        "seconds": seconds,
+        "cpu_seconds": 2 * seconds,
+        "peak_mb": 100 * seconds,
+        "rays": rays,
+        "run": run,
+        "notes": {},
+        **more,
+    }
 
 
 def test_costs_are_summed_by_stage_in_the_order_of_the_pipeline():
-    rows = figures.stage_costs([cost("shoot", 1.0, 0), cost("sample", 0.5, 1000), cost("sample", 0.25, 500),
-                                cost("lod_export", 0.1, 0)], "now")
+    rows = figures.stage_costs(
+        [cost("shoot", 1.0, 0), cost("sample", 0.5, 1000), cost("sample", 0.25, 500), cost("lod_export", 0.1, 0)], "now"
+    )
     assert [r["stage"] for r in rows] == ["sample", "shoot", "lod_export"]
     assert rows[0]["jobs"] == 2 and rows[0]["seconds"] == 0.75 and rows[0]["cpu_seconds"] == 1.5
     assert rows[0]["rays"] == 1500 and rows[0]["peak_mb"] == 50
@@ -37,8 +46,13 @@ def test_notes_are_summed_and_savings_named():
 
 
 def test_ledger_sums_groups_and_states_shares():
-    rows = figures.ledger({"emitted": [[4.0, 3, 2], [0, 0, 1]], "received": [[3.0, 3, 2], [0, 0, 1]],
-                           "absorbed": [[1.0, 1, 1], [0, 0, 1]]})
+    rows = figures.ledger(
+        {
+            "emitted": [[4.0, 3, 2], [0, 0, 1]],
+            "received": [[3.0, 3, 2], [0, 0, 1]],
+            "absorbed": [[1.0, 1, 1], [0, 0, 1]],
+        }
+    )
     assert [r[0][:8] for r in rows] == ["emitted", "not rece", "received", "absorbed"]
     assert rows[0][1] == [4, 3, 3] and rows[0][2] == 1.0
     assert rows[1][1] == [1, 0, 0] and rows[1][2] == pytest.approx(0.1)
@@ -56,10 +70,20 @@ def test_gouraud_needs_two_triangles_a_leaf():
 
 def test_budget_rows_list_who_gave_up_and_what():
     def row(name, before, after, saved):
-        return {"surface": name, "level_before": before, "level_after": after, "size_before": [2**before + 1] * 2,
-                "size_after": [2**after + 1] * 2, "bytes_before": saved + 10, "bytes_after": 10, "D": 9.0,
-                "D_given_up": 0.5}
+        return {
+            "surface": name,
+            "level_before": before,
+            "level_after": after,
+            "size_before": [2**before + 1] * 2,
+            "size_after": [2**after + 1] * 2,
+            "bytes_before": saved + 10,
+            "bytes_after": 10,
+            "D": 9.0,
+            "D_given_up": 0.5,
+        }
 
     rows = figures.budget_rows({"surfaces": [row("kept", 3, 3, 0), row("wall", 4, 2, 700), row("floor", 5, 4, 900)]})
     assert [(r["name"], r["levels"], r["saved"], r["to"]) for r in rows] == [
-        ("floor", 1, 900, "17 \u00d7 17"), ("wall", 2, 700, "5 \u00d7 5")]
+        ("floor", 1, 900, "17 \u00d7 17"),
+        ("wall", 2, 700, "5 \u00d7 5"),
+    ]

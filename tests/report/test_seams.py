@@ -28,7 +28,12 @@ def test_hidden_samples_are_left_out():
 def test_sides_of_a_map_are_its_first_and_last_rows_and_columns():
     value = np.arange(6.0).reshape(2, 3, 1)  # rows v = 0: 0 1 2, v = 1: 3 4 5
     hidden = np.zeros((2, 3), bool)
-    assert [seams.line(value, hidden, s)[0].ravel().tolist() for s in range(4)] == [[0, 3], [2, 5], [0, 1, 2], [3, 4, 5]]
+    assert [seams.line(value, hidden, s)[0].ravel().tolist() for s in range(4)] == [
+        [0, 3],
+        [2, 5],
+        [0, 1, 2],
+        [3, 4, 5],
+    ]
     assert [np.unique(seams.border_uv(s)[s // 2]).tolist() for s in range(4)] == [[0], [1], [0], [1]]
 
 
