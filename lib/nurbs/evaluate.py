@@ -4,9 +4,12 @@ Source: Piegl, Tiller, The NURBS Book: A2.1 (span), A2.2 (basis), eq. 2.7 (deriv
 Normals: N = S_u x S_v; where it vanishes (pole, cusp, doubled control points) the limit from inside is taken.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 BATCH = 16384  # points evaluated at once: their control points stay in the cache
+REMEMBERED = 8192  # numbers in the largest basis matrix that is kept
 DEGENERATE = 1e-10  # |S_u x S_v| below this share of the surface's own scale has no direction in float64
 NUDGES = (1e-7, 1e-5, 1e-3)  # steps into the domain: the limit to 1e-7 at a plain pole, later ones for higher orders
 
@@ -81,12 +84,21 @@ def evaluate_grid(surface, u, v):
 
 
 def _dense(knots, degree, n, u):
+    """Basis functions and derivatives as full rows: (2, m, n), remembered, since surfaces share knots and grids."""
     u = np.asarray(u, dtype=np.float64)
-    k, N, dN = basis(knots, degree, n, u)
+    remembered = _remembered if u.size * n <= REMEMBERED else _remembered.__wrapped__
+    return remembered(knots.tobytes(), degree, n, u.tobytes())
+
+
+@lru_cache(maxsize=256)
+def _remembered(knots, degree, n, u):
+    u = np.frombuffer(u)
+    k, N, dN = basis(np.frombuffer(knots), degree, n, u)
     full = np.zeros((2, u.size, n))
     columns = k[:, None] + np.arange(-degree, 1)
     np.put_along_axis(full[0], columns, N, axis=1)
     np.put_along_axis(full[1], columns, dN, axis=1)
+    full.flags.writeable = False
     return full
 
 
