@@ -1,10 +1,10 @@
 """Sum the light groups, B = rho_avg H, and multiply the light of textured surfaces by their base texture over rho_avg.
 
-reads   scene.npz, light maps of one chunk, materials and textures JSON    (lib.formats.scene, .light_maps; pictures)
+reads   scene.npz, light maps of every chunk, materials and textures JSON    (lib.formats.scene, .light_maps; pictures)
         materials: {"rho_avg": {surface: [r, g, b]}}
         textures:  {"textures": {surface: {"file": path, "colour_space": "srgb", "repeat": [n, m]}}}
         settings:  {"texture_level": 10, "intensity": {group: factor or [r, g, b]}}
-writes  textured maps of the chunk                                         (lib.formats.textured_maps)
+writes  textured maps of all surfaces                                         (lib.formats.textured_maps)
         MAPS_FOLDER/<surface>.exr for each surface: B without base texture, full size
 """
 
@@ -26,17 +26,17 @@ from lib.refusal import Refusal
 
 def arguments(parser):
     parser.add_argument("--scene", required=True, metavar="FILE", help="scene.npz")
-    parser.add_argument("--maps", required=True, metavar="FILE", help="light maps of the chunk")
+    parser.add_argument("--maps", required=True, nargs="+", metavar="FILE", help="light maps of every chunk")
     parser.add_argument("--materials", required=True, metavar="FILE", help="JSON: rho_avg of every surface")
     parser.add_argument("--textures", required=True, metavar="FILE", help="JSON: base textures")
     parser.add_argument("--settings", type=json.loads, default={}, metavar="JSON", help="texture_level, intensity")
     parser.add_argument("--maps-folder", required=True, metavar="FOLDER", help="where the EXR maps go")
-    parser.add_argument("--out", required=True, metavar="FILE", help="textured maps of the chunk")
+    parser.add_argument("--out", required=True, metavar="FILE", help="textured maps of all surfaces")
 
 
 def body(args, cost):
     x = scene.load(args.scene)
-    chunk = light_maps.load(args.maps)
+    chunk = light_maps.merge([light_maps.load(path) for path in args.maps])
     rho_avg = read_json(args.materials)["rho_avg"]
     textures = read_json(args.textures)["textures"]
     texture_level = checked_level(args.settings.get("texture_level", 10))

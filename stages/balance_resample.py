@@ -1,6 +1,6 @@
 """Turn the trees of a chunk into plain maps: balance, the recursive bilinear transform, direct and indirect added, idle levels dropped.
 
-reads   scene.npz, casters.npz, solution.npz, direct_<c>.npz, indirect_<c>.npz     (lib.formats.scene, .casters, .solution, .trees)
+reads   scene.npz, solution.npz, direct_<c>.npz, indirect_<c>.npz                  (lib.formats.scene, .solution, .trees)
 writes  chunk_<c>.npz: irradiance H per light group                                (lib.formats.light_maps)
 
 settings: tolerance, relative_to, t_direct, t_indirect
@@ -11,7 +11,7 @@ import json
 import numpy as np
 
 from lib import door
-from lib.formats import casters, light_maps, scene, solution, trees
+from lib.formats import light_maps, scene, solution, trees
 from lib.maps.combine import combine
 from lib.maps.mapset import MapSet
 from lib.radiosity.thresholds import thresholds

@@ -44,7 +44,7 @@ def body(args, cost):
         done = {}
     else:
         direct = {s: t.dense() for path in args.direct for s, t in trees.load(path, "direct")[0].items()}
-        mine = np.flatnonzero((world.chunk_of(args.chunks) == args.chunk) & world.has_map)
+        mine = world.chunk(args.chunks, args.chunk)
         table = lookup_table(world, direct, solved)
         done = refine_indirect(
             world, mine, table, chosen["seed"], tau, chosen["top"], chosen["base_indirect"], chosen["gather_rays"]

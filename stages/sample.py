@@ -3,7 +3,7 @@
 reads   scene.npz, casters.npz                  (lib.formats.scene, .casters)
 writes  chunk_<c>.npz                           (lib.formats.samples)
 
-settings: seed, n_elements, rays_per_element, shadow_rays [n0, n1], base_direct, bounces
+settings: seed, n_elements, rays_per_element, first_shadow_rays [n0, n1], base_direct, bounces
 """
 
 import json
@@ -30,9 +30,9 @@ def body(args, cost):
     world = World(scene.load(args.scene), casters.load(args.casters))
     chosen = args.settings
     grids = world.grids(chosen["n_elements"])
-    mine = np.flatnonzero((world.chunk_of(args.chunks) == args.chunk) & world.has_map)
+    mine = world.chunk(args.chunks, args.chunk)
     level, seed = chosen["base_direct"], chosen["seed"]
-    base, spared = base_lattice(world, mine, seed, level, chosen["shadow_rays"])
+    base, spared = base_lattice(world, mine, seed, level, chosen["first_shadow_rays"])
     rays = 0 if chosen["bounces"] == 1 else chosen["rays_per_element"]
     lit = [s for s in mine if grids.n_u[s]]
     elements = [surface_elements(world, s, seed, grids, rays, base[s]) for s in lit]

@@ -1,17 +1,14 @@
-"""Which job handles which surface: fixed by the surfaces' work alone, so that every machine cuts the same chunks."""
+"""Which job handles which surface: fixed by the scene and the number of chunks alone, so that every machine cuts the same chunks."""
 
 import numpy as np
 
 
-def assign(work, n_chunks):
-    """Chunk of each surface, (n,) int: longest work first, each to the chunk with the least so far; ties to the lowest number.
+def members(has_map, n_chunks, chunk):
+    """Surfaces of a chunk, ascending: every n_chunks-th of those with maps.
 
-    >>> assign([5, 1, 4, 2], 2).tolist()
-    [0, 0, 1, 1]
+    Surfaces are ordered by name, so the like pieces of one object, and the walls of a room, spread over the chunks.
+
+    >>> members(np.array([True, False, True, True]), 2, 0).tolist()
+    [0, 3]
     """
-    work = np.asarray(work, dtype=np.float64)
-    load, chunk = np.zeros(n_chunks), np.zeros(len(work), dtype=np.int64)
-    for s in np.argsort(-work, kind="stable"):
-        chunk[s] = np.argmin(load)
-        load[chunk[s]] += work[s]
-    return chunk
+    return np.flatnonzero(has_map)[chunk::n_chunks]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from lib.formats import artefact
+from lib.maps import mapset
 from lib.maps.mapset import MapSet
 
 KIND, VERSION = "light_maps", 1
@@ -46,3 +47,10 @@ def load(path):
         raise artefact.ArtefactError(f"{path}: field {error} is missing") from None
     check(x, path)
     return x
+
+
+def merge(chunks):
+    """Return the LightMaps of all chunks together, ascending by surface.  ValueError if a surface is in two."""
+    chunks = list(chunks)
+    stats = {name: figures for c in chunks for name, figures in c.stats.items()}
+    return LightMaps(mapset.merge([c.maps for c in chunks]), stats)

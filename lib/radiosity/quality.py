@@ -15,13 +15,15 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True)
 class Quality:
-    """n_elements in the scene and rays_per_element for their rows; gather_rays K; shadow_rays (n0, n1);
+    """n_elements in the scene and rays_per_element for their rows; gather_rays K; shadow_rays (n0, n1), the same for every
+    tolerance at first_shadow_rays, which the elements see;
     thresholds t_direct, t_indirect in units of the scene's mean irradiance; levels of the two trees (base, top)."""
 
     n_elements: int
     rays_per_element: int
     gather_rays: int
     shadow_rays: tuple
+    first_shadow_rays: tuple
     t_direct: float
     t_indirect: float
     base_direct: int
@@ -47,6 +49,7 @@ def quality(tolerance, max_level=6):
         rays_per_element=256,
         gather_rays=rays,
         shadow_rays=(16, n1),
+        first_shadow_rays=(16, 64),
         t_direct=0.025 * ratio,
         t_indirect=0.05 * ratio,
         base_direct=4,

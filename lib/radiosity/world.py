@@ -4,7 +4,7 @@ from functools import cached_property
 
 import numpy as np
 
-from lib.elements.chunks import assign
+from lib.elements.chunks import members
 from lib.elements.grids import element_grids
 from lib.elements.lattice import Lattice, roots_of
 from lib.nurbs.shape import transformed
@@ -65,9 +65,6 @@ class World:
         c = self.casters
         return element_grids(c.area, c.extent, c.is_planar, self.reflects, n_elements)
 
-    def chunk_of(self, n_chunks):
-        """Chunk of each surface: by the crossings of its base lattice, and by its area, where the light's detail is."""
-        area = self.casters.area / max(self.casters.area.sum(), 1e-300)
-        crossings = np.array([np.prod(lattice.shape(4)) for lattice in self.lattices], dtype=np.float64)
-        work = np.where(self.has_map, crossings / max(crossings.sum(), 1.0) + area, 0.0)
-        return assign(work, n_chunks)
+    def chunk(self, n_chunks, chunk):
+        """Surfaces with maps that a chunk handles, ascending."""
+        return members(self.has_map, n_chunks, chunk)
