@@ -15,14 +15,14 @@ import re
 import numpy as np
 
 from lib.formats import names
-from lib.formats.geometry_file import MAX_PATCHES, GeometryFile, Patch
+from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch
 from lib.nurbs.surface import bezier
 
 MAX_DEGREE = 20
 
 
 def read(text, report, only=None, teaset=False):
-    """Read the text of a .bpt, or of a teaset file, as a GeometryFile; mistakes go to `report` (see geometry_file)."""
+    """Read the text of a .bpt, or of a teaset file, as a GeometryFile; mistakes go to `report` (see patches)."""
     lines = [(number, line.split("#")[0]) for number, line in enumerate(text.splitlines(), 1)]
     rows = [(number, re.split(r"[\s,]+", line.strip(" \t,"))) for number, line in lines if line.strip(" \t,")]
     if not rows:

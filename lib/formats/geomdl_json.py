@@ -11,8 +11,8 @@ import math
 import numpy as np
 
 from lib.formats import names
-from lib.formats.geometry_file import MAX_PATCHES, GeometryFile, Patch
 from lib.formats.mistakes import nearest, shown
+from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch
 from lib.nurbs.surface import from_points
 
 MAX_DEGREE = 20
@@ -22,7 +22,7 @@ _KNOWN = (*_REQUIRED, "type", "rational", "dimension", "delta", "name", "id", "t
 
 
 def read(text, report, only=None, trimmed="refuse"):
-    """Read the text of a geomdl JSON file as a GeometryFile; mistakes go to `report` (see geometry_file)."""
+    """Read the text of a geomdl JSON file as a GeometryFile; mistakes go to `report` (see patches)."""
     records = _records(_parse(text, report), report)
     report.total = len(records)
     patches, skipped, labels_seen = [], 0, []

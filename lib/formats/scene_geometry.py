@@ -7,6 +7,7 @@ import numpy as np
 
 from lib.formats import geometry_file, names, placement
 from lib.formats.mistakes import Mistakes
+from lib.formats.patches import Patch
 from lib.formats.quantities import METRES
 from lib.formats.scene_rules import entry_name
 from lib.nurbs.shape import area, transformed
@@ -41,7 +42,7 @@ def load(entries, units, folder, file, where=None):
 
     Raises Refusal listing every mistake of all entries.
     """
-    mistakes, notes, placed, contents = Mistakes(), [], [], {}
+    mistakes, notes, placed, contents, areas = Mistakes(), [], [], {}, {}
     where = where or (lambda path: (file, None))
     for index, entry in enumerate(entries):
         try:
@@ -56,7 +57,7 @@ def load(entries, units, folder, file, where=None):
                     raise refusal("states no unit; say it with `units`", entry["file"], entry_name(entry), "units")
                 unit = METRES[units] if unit is None else unit
             else:
-                parts, total, unit = [geometry_file.Patch(0, inline(entry))], 0, METRES[units]
+                parts, total, unit = [Patch(0, inline(entry))], 0, METRES[units]
         except Refusal as error:
             for line in str(error).splitlines():
                 mistakes.add_text(line)
@@ -66,7 +67,8 @@ def load(entries, units, folder, file, where=None):
             source, line = where(("geometry", index, *field.split("[")[0].split(".")))
             mistakes.add(what, source, entry_name(entry), field, line)
             continue
-        placed += _placed(entry, index, parts, total, unit / METRES[units], METRES[units], mistakes, where)
+        to_units = (unit / METRES[units], METRES[units])
+        placed += _placed(entry, index, parts, total, to_units, areas, mistakes, where)
     _check_names(placed, mistakes, where)
     mistakes.stop()
     return placed, notes
@@ -122,8 +124,9 @@ def _check_corners(corners):
         raise ValueError("quadrangle: the corners cross or are concave; expected a convex round trip of four corners")
 
 
-def _placed(entry, index, parts, total, to_scene, to_metres, mistakes, where):
-    """Every copy of an entry's patches, in world metres."""
+def _placed(entry, index, parts, total, to_units, areas, mistakes, where):
+    """Every copy of an entry's patches, in world metres; to_units = (file to scene, scene to metres)."""
+    to_scene, to_metres = to_units
     places = entry.get("place", {})
     places = places if isinstance(places, list) else [places]
     result = []
@@ -136,35 +139,50 @@ def _placed(entry, index, parts, total, to_scene, to_metres, mistakes, where):
             source, line = where(("geometry", index, "place"))
             mistakes.add(what, source, name, field, line)
             continue
-        M[:3, :3] *= to_scene * to_metres
+        M[:3, :3] *= to_metres * to_scene
         M[:3, 3] *= to_metres
         mirrored = np.linalg.slogdet(M[:3, :3])[0] < 0
         for part in parts:
             full = names.patch(name, part.number, total) if total else name
-            made = _world(part.surface, M, full, index, mistakes, where)
+            made = _world(part.surface, M, full, index, areas, mistakes, where)
             if made is not None:
                 flip = bool(part.flip) ^ bool(mirrored) ^ bool(entry.get("flip", False))
                 result.append(Placed(full, name, index, made[0], flip, made[1]))
     return result
 
 
-def _world(surface, M, name, index, mistakes, where):
-    """(surface in metres, its area), or None with the reason noted."""
+def _world(part, M, name, index, areas, mistakes, where):
+    """(surface in metres, its area), or None with the reason noted; `areas` keeps those of the parts by identity."""
     file, line = where(("geometry", index))
     try:
-        surface = surface if np.array_equal(M, np.eye(4)) else transformed(surface, M)
+        surface = part if np.array_equal(M, np.eye(4)) else transformed(part, M)
     except ValueError as error:
         field, _, what = str(error).partition(": ")
         mistakes.add(what, file, name, f"place ({field})", line)
         return None
     P = surface.P.reshape(-1, 3)
     size = float(np.ptp(P, axis=0).max())
-    found = area(surface) if size > 0 else 0.0
+    scale = _similarity(M)
+    if not size > 0:
+        found = 0.0
+    elif scale is None:
+        found = area(surface)
+    else:  # copies by the thousand: one integral
+        if id(part) not in areas:
+            areas[id(part)] = (area(part), part)  # the part too: an identity lasts as long as what it names
+        found = areas[id(part)][0] * scale**2
     rounding = 16 * np.finfo(np.float64).eps * float(np.abs(P).max()) * size
     if not found > max(FLAT * size * size, rounding):
         mistakes.add("the surface has no area (it is a line or a point)", file, name, line=line)
         return None
     return surface, found
+
+
+def _similarity(M):
+    """The scale of a map that keeps angles, else None."""
+    A = M[:3, :3]
+    scale = float(np.linalg.norm(A[0]))
+    return scale if scale > 0 and np.abs(A @ A.T / scale**2 - np.eye(3)).max() < 1e-12 else None
 
 
 def _check_names(placed, mistakes, where):

@@ -78,6 +78,7 @@ def entry_name(entry):
 
 
 def unknown_material(name, known):
+    """The complaint about a material that is not defined."""
     return f"no material '{name}' is defined{nearest(name, known) or '; there are ' + listed(known)}"
 
 

@@ -5,6 +5,7 @@ duplicate keys, tags, NaN and infinity.  The tree is built from parser events wi
 and alias bombs end after a bounded amount of work.  The one importer of yaml.
 """
 
+import os
 import re
 
 import yaml
@@ -113,6 +114,8 @@ def read(path, shown_as=None):
 
 def _text(path, name):
     try:
+        if os.path.exists(path) and not os.path.isfile(path):
+            raise refusal("is not a file", file=name)
         with open(path, "rb") as file:
             data = file.read(MAX_BYTES + 1)
     except FileNotFoundError:

@@ -11,8 +11,8 @@ import numpy as np
 import rhino3dm
 
 from lib.formats import names
-from lib.formats.geometry_file import GeometryFile, Patch
 from lib.formats.mistakes import listed
+from lib.formats.patches import GeometryFile, Patch
 from lib.nurbs.surface import NurbsSurface
 
 METRES = {
@@ -28,7 +28,7 @@ _WORDS = {
 
 
 def read(data, report, only=None, trimmed="refuse"):
-    """Read the bytes of a .3dm as a GeometryFile; mistakes go to `report` (see geometry_file).
+    """Read the bytes of a .3dm as a GeometryFile; mistakes go to `report` (see patches).
 
     Faces are numbered in the order of the file over everything visible, whatever `only` and `trimmed` leave out, so
     that a name stays when they change.

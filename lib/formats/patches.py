@@ -1,0 +1,68 @@
+"""What every reader of geometry files returns, and where it notes its mistakes."""
+
+from dataclasses import dataclass, field
+
+from lib.formats import names
+from lib.formats.mistakes import Mistakes
+from lib.nurbs.surface import NurbsSurface
+
+MAX_PATCHES = 100_000
+
+
+@dataclass(frozen=True)
+class Patch:
+    """One surface of a file.
+
+    number : from 1, its place in the file
+    surface : NurbsSurface in the file's unit and axes
+    flip : the lit side is against S_u x S_v
+    labels : texts that the entry's `only` may match (layer, object name, number)
+    """
+
+    number: int
+    surface: NurbsSurface
+    flip: bool = False
+    labels: tuple = ()
+
+
+@dataclass(frozen=True)
+class GeometryFile:
+    """Patches of a file in its order, with what was left out.
+
+    total : how many patches the file counts, those that were not selected included; it fixes the padding of names
+    metres : length of the file's unit [m], None if the file states none
+    notes : one sentence per kind of thing that was skipped
+    """
+
+    patches: list
+    total: int
+    metres: float | None = None
+    notes: list = field(default_factory=list)
+
+
+@dataclass
+class Report:
+    """Where a reader notes its mistakes: in `file`, about patch `number` of the entry `name`."""
+
+    mistakes: Mistakes
+    file: str
+    name: str
+    total: int = 1
+
+    def add(self, what, number=None, field=None, line=None):
+        surface = None if number is None else names.patch(self.name, number, self.total)
+        self.mistakes.add(what, self.file, surface, field, line)
+
+    def fatal(self, what, number=None, field=None, line=None):
+        """Note a mistake after which reading can not go on, and stop."""
+        self.add(what, number, field, line)
+        self.mistakes.stop()
+
+    def surface(self, make, number, line=None):
+        """`make()`, or None with the reason noted where it raises the ValueError of NurbsSurface (`FIELD: what`)."""
+        try:
+            return make()
+        except ValueError as error:
+            where, _, what = str(error).partition(": ")
+            self.add(what or where, number, where if what else None, line)
+            return None
