@@ -1,5 +1,6 @@
 """Everything a bake left in its results folder, found and loaded: what the report tells of."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -25,7 +26,7 @@ GIVEN = {  # name: pattern below the results folder, whether it is a list, wheth
 class Bake:
     """scene, casters, solution, textures as their modules load them; trees: [{surface: Tree} direct, then indirect];
     tree_facts: what refine noted; maps: MapSet of H of all chunks; budget, lods: the JSON; costs: records of all jobs.
-    None, {} or [] where there is no file. folder: where the exported files are; disk_bytes: of the textures."""
+    None, {} or [] where there is no file. folder: where the exported files are."""
 
     folder: Path
     scene: object
@@ -38,7 +39,6 @@ class Bake:
     budget: dict | None
     lods: dict
     costs: list
-    disk_bytes: int | None
 
 
 def find(given, results=None):
@@ -74,21 +74,24 @@ def load(files):
         textures=read(textured_maps, "textures"),
         budget=read_json(files["budget"]) if files["budget"] else None,
         lods=lods,
-        costs=[_named(read_json(path), path) for path in files["costs"] or []],
-        disk_bytes=_disk_bytes(folder, lods),
+        costs=[
+            _named(read_json(path), path)
+            for path in files["costs"] or []
+            if _is_current(path, len(files["direct"] or []), len(lods["levels"]))
+        ],
     )
+
+
+def _is_current(path, n_chunks, n_levels):
+    """Is a cost file of a job that this bake has? Fewer chunks or levels leave those of an earlier one behind."""
+    numbered = re.fullmatch(r"cost_(?:direct_|indirect_)?(\d+)", Path(path).stem)
+    if numbered is None:
+        return True
+    jobs = n_levels if Path(path).parent.name == "lod_export" else n_chunks
+    return not jobs or int(numbered[1]) < jobs
 
 
 def _named(cost, path):
     """A cost record whose stage tells the halves of refine apart, by the name of its file."""
     half = next((h for h in ("indirect", "direct") if cost["stage"] == "refine" and h in Path(path).name), None)
     return {**cost, "stage": f"refine {half}"} if half else cost
-
-
-def _disk_bytes(folder, lods):
-    """Bytes of the picture files that the finest level names, None where that can not be told."""
-    first = folder / lods["levels"][0]["file"]
-    if first.suffix != ".gltf" or not first.exists():
-        return None
-    named = {image.get("uri") for image in read_json(first).get("images", [])}
-    return sum((folder / uri).stat().st_size for uri in named if uri and (folder / uri).exists())

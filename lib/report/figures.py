@@ -186,6 +186,9 @@ def level_rows(lods):
                 "rms_distance": level.get("rms_distance"),
                 "gap": level.get("gap"),
                 "coverage": level.get("screen_coverage"),
+                "slide": level.get("max_slide"),
+                "asked": level.get("asked"),
+                "note": level.get("note") or "",
                 "bytes": level.get("bytes"),
             }
         )
@@ -226,7 +229,12 @@ def collect(name, bake, settings, run):
     stages = stage_costs(bake.costs, run)
     levels = level_rows(bake.lods)
     history = solution.history if solution is not None and len(solution.history) else np.zeros((0, 2))
-    memory = {"budget": table["T"], "before": table["S_before"], "after": table["S_after"], "disk": bake.disk_bytes}
+    memory = {
+        "budget": table["T"],
+        "before": table["S_before"],
+        "after": table["S_after"],
+        "disk": bake.lods.get("texture_bytes"),
+    }
     unshot = float(history[-1, 1]) if len(history) else None
     return {
         "scene": name,
