@@ -120,7 +120,8 @@ def _check_corners(corners):
     ahead, back = np.roll(corners, -1, axis=0) - corners, np.roll(corners, 1, axis=0) - corners
     N = np.cross(ahead, back)
     size = np.abs(corners - corners[0]).max() ** 2
-    if (N @ N.sum(axis=0) < -1e-9 * size * size).any():
+    crossed = np.linalg.norm(N.sum(axis=0)) < 1e-9 * np.linalg.norm(N, axis=1).sum()
+    if crossed or (N @ N.sum(axis=0) < -1e-9 * size * size).any():
         raise ValueError("quadrangle: the corners cross or are concave; expected a convex round trip of four corners")
 
 

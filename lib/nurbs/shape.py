@@ -8,7 +8,7 @@ from lib.nurbs.surface import NurbsSurface
 SAME = 1e-9  # points closer than this share of the surface's size are one point
 PLANAR = 1e-7  # a surface within this share of its size of a plane is planar: float32 rays can not tell
 SIDE_SAMPLES = np.linspace(0.0, 1.0, 17)
-GAUSS_CELLS, GAUSS_ORDER = 16, 4  # composite Gauss-Legendre: 1e-9 on spheres, 1e-5 across creases between cells
+GAUSS_CELLS, GAUSS_ORDER = 16, 4  # composite Gauss-Legendre between knots: 1e-9 on spheres
 
 
 def size(surface):
@@ -49,24 +49,29 @@ def is_planar(surface):
     return bool(np.abs(centred @ plane).max() <= PLANAR * np.ptp(S, axis=0).max())
 
 
-def _gauss():
+def _gauss(knots):
+    """Nodes and weights over [0, 1]: no cell crosses a knot, where derivatives jump."""
     x, weight = np.polynomial.legendre.leggauss(GAUSS_ORDER)
-    t = (np.arange(GAUSS_CELLS)[:, None] + (x + 1) / 2).ravel() / GAUSS_CELLS
-    return t, np.tile(weight / 2 / GAUSS_CELLS, GAUSS_CELLS)
+    spans = np.unique(np.concatenate([[0.0, 1.0], knots[(knots > 0) & (knots < 1)]]))
+    parts = np.ceil(np.diff(spans) * GAUSS_CELLS).astype(int)
+    lines = [a + (b - a) * np.arange(n) / n for a, b, n in zip(spans[:-1], spans[1:], parts, strict=True)]
+    start = np.concatenate([*lines, [1.0]])
+    step = np.diff(start)[:, None]
+    return (start[:-1, None] + step * (x + 1) / 2).ravel(), (step * weight / 2).ravel()
 
 
 def area(surface):
     """Area of the surface [m^2], integral of |S_u x S_v|."""
-    t, weight = _gauss()
-    _, S_u, S_v = evaluate_grid(surface, t, t)
-    return float(weight @ np.linalg.norm(np.cross(S_u, S_v), axis=2) @ weight)
+    (u, weight_u), (v, weight_v) = _gauss(surface.knots_u), _gauss(surface.knots_v)
+    _, S_u, S_v = evaluate_grid(surface, u, v)
+    return float(weight_v @ np.linalg.norm(np.cross(S_u, S_v), axis=2) @ weight_u)
 
 
 def extent(surface):
     """Mean length of the curves along u and along v: (length_u, length_v)."""
-    t, weight = _gauss()
-    _, S_u, S_v = evaluate_grid(surface, t, t)
-    return float(weight @ np.linalg.norm(S_u, axis=2) @ weight), float(weight @ np.linalg.norm(S_v, axis=2) @ weight)
+    (u, weight_u), (v, weight_v) = _gauss(surface.knots_u), _gauss(surface.knots_v)
+    _, S_u, S_v = evaluate_grid(surface, u, v)
+    return tuple(float(weight_v @ np.linalg.norm(along, axis=2) @ weight_u) for along in (S_u, S_v))
 
 
 def transformed(surface, M):
