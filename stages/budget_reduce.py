@@ -1,12 +1,13 @@
 """Shrink the exported textures until their GPU bytes S fit the budget T, giving up the least detail.
 
 reads   textured maps of every chunk, casters.npz (closed directions)     (lib.formats.textured_maps, .casters)
-        settings: {"budget": bytes, "profile": "standard" or "lightmap"}
+        settings: {"budget": bytes, "profile": "standard" or "lightmap", "order": "loss" or "loss_per_byte"}
 writes  textures.npz, all surfaces                                         (lib.formats.textured_maps)
         budget.json: S before and after, who gave up what
 
 `standard` exports light on its base texture and reduces those maps; `lightmap` exports and reduces the light alone,
-and the base textures count as fixed bytes.
+and the base textures count as fixed bytes.  `loss` takes the smallest D_i first, as the paper does; `loss_per_byte` the
+smallest D_i for the bytes it frees.
 """
 
 import dataclasses
@@ -35,18 +36,21 @@ def body(args, cost):
     profile = args.settings.get("profile", "standard")
     if profile not in PROFILES:
         raise Refusal(f"profile: {profile!r}, allowed are {' and '.join(PROFILES)}")
+    order = args.settings.get("order", "loss")
+    if order not in budget.ORDERS:
+        raise Refusal(f"order: {order!r}, allowed are {' and '.join(budget.ORDERS)}")
     T = args.settings.get("budget")
     before = getattr(x, PROFILES[profile])
     fixed = 0 if profile == "standard" else sum(budget.gpu_bytes(w, h) for w, h in x.pictures.values())
 
-    after, steps, D = budget.reduce(before, is_closed[before.surface], T, fixed)
+    after, steps, D = budget.reduce(before, is_closed[before.surface], T, fixed, order)
 
     textured_maps.save(args.out, dataclasses.replace(x, **{PROFILES[profile]: after}))
-    write_json(args.table, table(x.names, profile, T, fixed, before, after, steps, D))
+    write_json(args.table, table(x.names, profile, order, T, fixed, before, after, steps, D))
     cost.notes["levels_removed"] = len(steps)
 
 
-def table(names, profile, T, fixed, before, after, steps, D):
+def table(names, profile, order, T, fixed, before, after, steps, D):
     """Return the JSON record: totals, one row a surface, one row a removal in order; bytes are GPU bytes."""
     name_of = dict(zip(before.surface.tolist(), names, strict=True))
     (w0, h0), (w1, h1) = before.sizes(), after.sizes()
@@ -66,6 +70,7 @@ def table(names, profile, T, fixed, before, after, steps, D):
     ]
     return {
         "profile": profile,
+        "order": order,
         "T": int(T),
         "S_before": budget.total(before, fixed),
         "S_after": budget.total(after, fixed),

@@ -139,7 +139,17 @@ def checked(budget, smallest):
     return int(budget)
 
 
-def reduce(maps, closed, budget, fixed=0):
+# What is smallest goes first, given D_i, the bytes its removal saves and the levels the map has given up already.
+# "loss" is the paper's rule.  A map it has begun with has fewer samples and so a smaller D_i than before: it tends to be
+# taken down to its roots before the next is touched.  "loss_per_byte" counts D_i in samples of the map as baked, of
+# which one stands for 4^given_up now, and divides by the gain: all maps coarsen together.
+ORDERS = {
+    "loss": lambda D, saved, given_up: D,
+    "loss_per_byte": lambda D, saved, given_up: D * 4.0**given_up / saved,
+}
+
+
+def reduce(maps, closed, budget, fixed=0, order="loss"):
     """Remove levels from maps until S <= budget.
 
     Parameters
@@ -147,6 +157,7 @@ def reduce(maps, closed, budget, fixed=0):
     maps : MapSet, value (N, 3)
     closed : (m, 2) bool, the surface of map k is closed in u, in v
     budget : T [bytes], > 0;  fixed : bytes that count in S but can not shrink
+    order : "loss", the smallest D_i goes first (Moeller 1996); or "loss_per_byte", see ORDERS
 
     Returns
     -------
@@ -163,18 +174,27 @@ def reduce(maps, closed, budget, fixed=0):
     level = maps.level.astype(np.int64)
     D = np.array([detail(value[k], hidden[k]) if level[k] else 0.0 for k in range(len(maps))])
 
-    # Names are sorted, so the order of maps breaks ties by name.
-    heap = [(D[k], k) for k in range(len(maps)) if level[k]]
+    def saved(k):
+        return map_bytes(maps.roots[k], level[k]) - map_bytes(maps.roots[k], level[k] - 1)
+
+    def entry(k, loss):
+        return (
+            ORDERS[order](loss, saved(k), maps.level[k] - level[k]),
+            k,
+            loss,
+        )  # names are sorted: the index breaks ties by name
+
+    heap = [entry(k, D[k]) for k in range(len(maps)) if level[k]]
     heapq.heapify(heap)
     steps = []
     while S > T:
-        loss, k = heapq.heappop(heap)
-        S -= map_bytes(maps.roots[k], level[k]) - map_bytes(maps.roots[k], level[k] - 1)
+        _, k, loss = heapq.heappop(heap)
+        S -= saved(k)
         steps.append(Removal(int(maps.surface[k]), int(level[k]), float(loss), S))
         value[k], hidden[k] = low_pass(value[k], hidden[k], closed[k])
         level[k] -= 1
         if level[k]:
-            heapq.heappush(heap, (detail(value[k], hidden[k]), k))
+            heapq.heappush(heap, entry(k, detail(value[k], hidden[k])))
     if not steps:
         return maps, steps, D
     return pack(maps.surface, maps.roots, level, value, hidden), steps, D

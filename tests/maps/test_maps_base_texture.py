@@ -147,6 +147,17 @@ def test_evaluation_commutes_with_mirroring_and_transposing(shape):
     assert np.allclose(bt.evaluate_picture(turned, (1, 1), 17, 33), rho.transpose(1, 0, 2), atol=ROUND)
 
 
+@pytest.mark.parametrize("width", [0.3, 1, 2.7, 15, 40, 333])
+def test_box_means_are_those_of_a_picture_drawn_out_in_tiny_squares(width):
+    row = random_picture(1, 37)
+    centre = np.linspace(0, 74, 9)
+    means = bt._box(row, centre - width / 2, centre + width / 2, axis=1)[0]
+    fine = (np.arange(4000) + 0.5) / 4000
+    for k, c in enumerate(centre):
+        at = np.floor(c - width / 2 + width * fine).astype(int) % 37
+        assert np.allclose(means[k], row[0, at].astype(float).mean(axis=0), atol=2e-3)
+
+
 def test_constant_pictures_stay_constant_to_the_bit():
     for shape in [(1, 1), (5, 3), (200, 300)]:
         rho = bt.evaluate_picture(np.full((*shape, 3), 0.7, np.float32), (1, 1), 33, 9)

@@ -135,8 +135,8 @@ def test_the_coarsest_map_keeps_its_corners():
 # ---- removal
 
 
-def oracle(maps, closed, T):
-    """Recompute every D_i before every step; take the smallest, the first by order on a tie."""
+def oracle(maps, closed, T, order="loss"):
+    """Recompute every D_i before every step; take the smallest, the first by name on a tie."""
     value, hidden = [maps.map(k) for k in range(len(maps))], [maps.hidden_map(k) for k in range(len(maps))]
     level, sequence = maps.level.tolist(), []
 
@@ -145,20 +145,26 @@ def oracle(maps, closed, T):
 
     while S() > T:
         D = [budget.detail(value[k], hidden[k]) if level[k] else np.inf for k in range(len(maps))]
-        k = int(np.argmin(D))
+        saved = [
+            budget.map_bytes(r, n) - budget.map_bytes(r, n - 1) if n else 1
+            for r, n in zip(maps.roots, level, strict=True)
+        ]
+        weight = {"loss": 1, "loss_per_byte": 4.0 ** (maps.level - level) / saved}[order]
+        k = int(np.argmin(np.array(D) * weight))
         sequence.append((int(maps.surface[k]), level[k], D[k]))
         value[k], hidden[k] = budget.low_pass(value[k], hidden[k], closed[k])
         level[k] -= 1
     return sequence, value
 
 
+@pytest.mark.parametrize("order", ["loss", "loss_per_byte"])
 @pytest.mark.parametrize("seed, share", [(0, 0), (1, 0.2), (2, 0), (3, 0.6)])
-def test_the_order_of_removal_is_the_oracles(seed, share):
+def test_the_order_of_removal_is_the_oracles(seed, share, order):
     maps = random_maps(seed, share)
     closed = np.array([[0, 0], [1, 0], [0, 1], [0, 0], [1, 1]], bool)
     for T in (budget.total(maps) * 2 // 3, budget.total(maps) // 5, budget.smallest_total(maps.roots)):
-        reduced, steps, D = budget.reduce(maps, closed, T)
-        sequence, value = oracle(maps, closed, T)
+        reduced, steps, D = budget.reduce(maps, closed, T, order=order)
+        sequence, value = oracle(maps, closed, T, order)
         assert [(s.surface, s.level, s.D) for s in steps] == sequence and steps
         assert all(np.array_equal(reduced.map(k), value[k]) for k in range(len(maps)))
         S = [budget.total(maps)] + [s.S for s in steps]
@@ -173,6 +179,14 @@ def test_equal_losses_go_by_name():
     steps = budget.reduce(random_maps(0), np.zeros((5, 2), bool), budget.smallest_total([[1, 1]] * 9))[1]
     order = [(s.surface, s.level) for s in steps]
     assert all(order.index((0, level)) < order.index((6, level)) for level in (1, 2, 3, 4))  # two equal maps
+
+
+def test_per_byte_no_picture_is_sacrificed_for_its_equal():
+    rng = np.random.default_rng(0)
+    maps = pack([0, 1], [[1, 1]] * 2, [6, 6], [rng.random((65, 65, 3)), rng.random((65, 65, 3)) * 1.01])
+    T = budget.total(maps) // 3
+    assert abs(np.diff(budget.reduce(maps, np.zeros((2, 2), bool), T, order="loss_per_byte")[0].level)[0]) <= 1
+    assert budget.reduce(maps, np.zeros((2, 2), bool), T, order="loss")[0].level.min() == 0
 
 
 def test_bilinear_light_goes_first_and_the_result_is_still_it():

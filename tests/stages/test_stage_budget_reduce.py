@@ -123,6 +123,8 @@ def test_an_unfit_budget_is_refused_with_the_smallest_total(T, tmp_path, capsys)
     assert "60 bytes" in capsys.readouterr().err and not (tmp_path / "textures.npz").exists()
 
 
-def test_an_unknown_profile_is_refused(tmp_path, capsys):
+def test_an_unknown_profile_or_order_is_refused(tmp_path, capsys):
+    assert run(tmp_path, build(tmp_path), budget=FULL, order="size")[0] == 1
+    assert "order: 'size', allowed are loss and loss_per_byte" in capsys.readouterr().err
     assert run(tmp_path, build(tmp_path), budget=FULL, profile="fast")[0] == 1
     assert "profile: 'fast', allowed are standard and lightmap" in capsys.readouterr().err
