@@ -19,7 +19,7 @@ from lib.nurbs.evaluate import evaluate_grid
 from lib.nurbs.shape import is_closed
 
 CELLS = 128  # quadrature cells a direction; sphere: area element to 5e-5, and errors common to all cells cancel
-MAX_TAPS = 16  # pixels under one box up to which adding them up is quicker than running sums (measured)
+MAX_TAPS = 16  # pixels under one box up to which adding them up is quicker than running sums
 
 
 def rho_average(surface, picture, repeat=(1, 1)):

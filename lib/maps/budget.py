@@ -140,8 +140,8 @@ def checked(budget, smallest):
 
 
 # What is smallest goes first, given D_i, the bytes its removal saves and the levels the map has given up already.
-# "loss" is the paper's rule.  A map it has begun with has fewer samples and so a smaller D_i than before: it tends to be
-# taken down to its roots before the next is touched.  "loss_per_byte" counts D_i in samples of the map as baked, of
+# "loss" is the paper's rule.  A map it has begun with has fewer samples and so a smaller D_i than before: it tends to
+# be taken down to its roots before the next is touched.  "loss_per_byte" counts D_i in samples of the map as baked, of
 # which one stands for 4^given_up now, and divides by the gain: all maps coarsen together.
 ORDERS = {
     "loss": lambda D, saved, given_up: D,
