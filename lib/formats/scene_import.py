@@ -39,7 +39,8 @@ def read(piece, folder, file):
     for written, digest in piece["digests"].items():
         path = Path(folder) / written
         if not path.is_file() or geometry_file.digest(path) != digest:
-            raise refusal("changed while the bake ran; start it again", file=path)
+            shown = Path(file).parent / written
+            raise refusal("changed while the bake ran; start it again", file=shown)
     placed, notes = scene_geometry.load(piece["geometry"], piece["units"], folder, file)
     return assemble(placed, notes, piece["surfaces"], piece["up"])
 

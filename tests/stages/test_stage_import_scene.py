@@ -1,0 +1,85 @@
+"""The stage makes the Scene that preflight saw, the same bytes each time and wherever the scene lies."""
+
+import json
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lib.formats import preflight, scene
+from stages import import_scene
+
+DATA = Path(__file__).parents[1] / "data"
+TEXT = """
+geometry:
+- {name: floor, rectangle: {origin: [0, 0, 0], u: [4, 0, 0], v: [0, 3, 0]}}
+- {name: lamp, triangle: [[1, 1, 2], [1, 2, 2], [2, 1, 2]], material: lamp}
+- {name: craft, file: v3_Speeder.3dm, place: {scale: [20, -20, 20]}, role: cast_only}
+- {name: pot, file: teapot.bpt, units: cm, place: [{scale: 3}, {scale: 3, translate: [1, 1, 0]}]}
+materials: {lamp: {lumens: 800, group: evening}}
+surfaces: {"pot.2/*": {reconstruction: gouraud, tolerance: 0.05, flip: true}}
+"""
+
+
+@pytest.fixture
+def home(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "room"
+    folder.mkdir()
+    (folder / "scene.yaml").write_text(TEXT)
+    for name in ("v3_Speeder.3dm", "teapot.bpt"):
+        shutil.copy(DATA / name, folder)
+    return folder
+
+
+def run(found, out="scene.npz"):
+    return import_scene.main(
+        ["--scene-slice", found.slices["geometry"], "--out", out, "--log", "log.txt", "--cost", "cost.json"]
+    )
+
+
+def test_the_scene_is_that_of_preflight(home, capsys):
+    found = preflight.load(home)
+    assert run(found) == 0
+    made = scene.load("scene.npz")
+    assert (made.names, made.files, made.role, made.groups) == (found.names, found.files, found.roles, found.groups)
+    assert made.is_black.tolist() == found.is_black
+    index = {name: k for k, name in enumerate(made.names)}
+    assert made.role[index["craft/1"]] == "cast_only" and made.groups == ["evening"]
+    crafts = made.flip[[index["craft/1"], index["craft/2"]]]
+    assert crafts.tolist().count(True) == 1  # one half is reversed in the file, the mirror turns both
+    assert not made.flip[index["pot.1/05"]] and made.flip[index["pot.2/05"]]
+    assert made.reconstruction[index["pot.2/05"]] == "gouraud" and made.tolerance[index["pot.2/05"]] == 0.05
+    E = made.E[index["lamp"]]
+    assert 683 * E @ [0.2126, 0.7152, 0.0722] * 0.5 == pytest.approx(800)
+    assert np.ptp(made.surfaces[index["floor"]].P, axis=(0, 1)) == pytest.approx([4, 3, 0])
+    skipped = "v3_Speeder.3dm: skipped: 15 curves, 8 text dots"
+    assert made.warnings == [skipped] and found.warnings == [skipped]
+    assert f"warning: {skipped}" in capsys.readouterr().err and skipped in Path("log.txt").read_text()
+    cost = json.loads(Path("cost.json").read_text())
+    assert cost["rays"] == 0 and cost["notes"]["surfaces"] == 68
+
+
+def test_the_bytes_depend_on_the_content_alone(home, tmp_path):
+    run(preflight.load(home), "first.npz")
+    entries = TEXT.split("materials:")[0].strip().split("\n")[1:]
+    shuffled = TEXT.replace("\n".join(entries), "\n".join(reversed(entries)))
+    home.rename(tmp_path / "away")
+    (tmp_path / "away" / "scene.yaml").write_text(shuffled)
+    run(preflight.load("away", {}, "elsewhere"), "second.npz")
+    assert Path("first.npz").read_bytes() == Path("second.npz").read_bytes()
+
+
+def test_a_file_that_changes_under_a_bake_is_refused(home, capsys):
+    found = preflight.load("room")
+    (home / "teapot.bpt").write_text("changed")
+    assert run(found) == 1
+    assert capsys.readouterr().err == "room/teapot.bpt: changed while the bake ran; start it again\n"
+    assert not Path("scene.npz").exists()
+
+
+def test_a_missing_slice_is_named(home, capsys):
+    preflight.load(home)
+    assert import_scene.main(["--scene-slice", "results/room/settings/none.json", "--out", "x.npz"]) == 1
+    assert "none.json: missing" in capsys.readouterr().err
