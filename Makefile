@@ -21,7 +21,7 @@ ACTIVATE = PATH="$$PWD/.venv/bin:$$PATH"; export PATH
 
 bake: setup  ## set up, then bake data/scenes/fruit_room into results/fruit_room (the default)
 	@$(ACTIVATE)
-	snakemake --cores $(CORES)
+	snakemake --cores $(CORES) --quiet rules reason host
 	echo
 	echo "Report:  results/fruit_room/report.html"
 	echo "GLB:     results/fruit_room/scene.glb"
@@ -30,10 +30,10 @@ test: setup  ## set up, then run every test (make test ARGS="-m 'not slow'" for 
 	@$(ACTIVATE)
 	python -m pytest $(ARGS)
 
-lint: setup  ## ruff over the code, snakemake --lint over the Snakefile
+lint: setup  ## ruff over the code; what snakemake --lint says, counted (it asks for conda, we have one lock file)
 	@$(ACTIVATE)
 	ruff check .
-	snakemake --lint
+	snakemake --lint 2>&1 | sed -n 's/^ *\* \(.*\)/\1/p' | sort | uniq -c
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*##/\1\t/p' Makefile | sort

@@ -50,46 +50,34 @@ def _read(root, path, stamp):
     """Text of a file and the names it imports; stamp is (mtime, size), so that an edited file is read anew."""
     with open(os.path.join(root, path), encoding="utf-8") as file:
         source = file.read()
-    return source, imported_modules(source, tuple(os.path.dirname(path).split(os.sep)))
+    return source, imported_modules(source, tuple(path.split("/")[:-1]))
 
 
-def _files_reached(path, root):
-    """Files one module depends on directly, relative to root: modules it imports, data files beside it."""
-    status = os.stat(os.path.join(root, path))
-    source, names = _read(root, path, (status.st_mtime_ns, status.st_size))
-    files = set()
-    for name in names:
-        parts = name.split(".")
-        if parts[0] in PACKAGES:
-            files.update(_module_files(parts, root))
-    return files | set(_data_files(path, source, root))
+def _listing(root):
+    """{path relative to root: (mtime, size)} of every file in lib and stages, caches and hidden ones left out."""
+    files, folders = {}, list(PACKAGES)
+    while folders:
+        folder = folders.pop()
+        with os.scandir(os.path.join(root, folder)) as entries:
+            for entry in entries:
+                if entry.name.startswith((".", "__pycache__")):
+                    continue
+                if entry.is_dir():
+                    folders.append(f"{folder}/{entry.name}")
+                else:
+                    status = entry.stat()
+                    files[f"{folder}/{entry.name}"] = (status.st_mtime_ns, status.st_size)
+    return files
 
 
-def _module_files(parts, root):
-    """The file of a dotted name, if it is one, and each `__init__.py` above it that is not empty."""
-    file = os.path.join(*parts) + ".py"
-    if os.path.isfile(os.path.join(root, file)):
-        yield file
-    for depth in range(1, len(parts) + 1):
-        init = os.path.join(*parts[:depth], "__init__.py")
-        if os.path.isfile(os.path.join(root, init)) and os.path.getsize(os.path.join(root, init)):
-            yield init
-
-
-def _data_files(path, source, root):
+def _data_files(path, source, data):
     """Files that are not Python, beside a module or in a folder beside it, whose name stands quoted in its source."""
-    folder = os.path.dirname(path)
-    with os.scandir(os.path.join(root, folder)) as entries:
-        for entry in entries:
-            if entry.name.endswith(".py") or entry.name.startswith((".", "__")):
-                continue
-            if f'"{entry.name}"' not in source and f"'{entry.name}'" not in source:
-                continue
-            if entry.is_file():
-                yield os.path.join(folder, entry.name)
-            elif not os.path.exists(os.path.join(entry.path, "__init__.py")):  # a folder of data, not a package
-                for place, _, names in os.walk(entry.path):
-                    yield from (os.path.relpath(os.path.join(place, name), root) for name in names)
+    start = path.rindex("/") + 1
+    for other in data:
+        if other.startswith(path[:start]):
+            name = other[start:].split("/")[0]  # the file, or the folder beside the module that it lies in
+            if f'"{name}"' in source or f"'{name}'" in source:
+                yield other
 
 
 def stage_code(stage, root="."):
@@ -108,14 +96,25 @@ def stage_code(stage, root="."):
     paths joined to root (relative paths for root ".").
 
     Raises FileNotFoundError if there is no such stage, SyntaxError if a file is not Python.
-    Modules named only at run time (importlib) are not seen.
+    Modules named only at run time (importlib) are not seen. `__init__.py` counts where it is not empty.
     """
     root = os.fspath(root)
-    reached, front = set(), [os.path.join("stages", f"{stage}.py")]
+    start = f"stages/{stage}.py"
+    if not os.path.isfile(os.path.join(root, start)):
+        raise FileNotFoundError(f"{start}: no such stage")
+    files = _listing(root)
+    data = [path for path in files if not path.endswith(".py")]
+    packages = {path.removesuffix("/__init__.py") for path in files if path.endswith("/__init__.py") and files[path][1]}
+
+    reached, front = set(), {start}
     while front:
         path = front.pop()
-        if path not in reached:
-            reached.add(path)
-            if path.endswith(".py"):
-                front += _files_reached(path, root) - reached
+        reached.add(path)
+        if not path.endswith(".py"):
+            continue
+        source, names = _read(root, path, files[path])
+        paths = {name.replace(".", "/") for name in names if name.startswith(PACKAGES)}
+        found = {f"{name}.py" for name in paths} & files.keys()
+        found |= {f"{p}/__init__.py" for p in packages if any(f"{name}/".startswith(f"{p}/") for name in paths)}
+        front |= (found | set(_data_files(path, source, data))) - reached
     return sorted(path if root == "." else os.path.join(root, path) for path in reached)

@@ -69,7 +69,7 @@ def test_data_files_a_module_mentions_count(tmp_path):
         tmp_path,
         {
             "stages/bake.py": "from lib.page import viewer\n",
-            "lib/page/viewer.py": "TEXT = (HERE / 'page.html').read_text(), (HERE / 'static' / 'a.js').read_text()\n",
+            "lib/page/viewer.py": "TEXT = HERE / 'page.html', HERE / \"static\" / 'a.js'  # not other.html\n",
             "lib/page/page.html": "<p>",
             "lib/page/other.html": "<p>",
             "lib/page/static/a.js": "1",
@@ -89,7 +89,7 @@ def test_root_dot_gives_relative_paths(tmp_path, monkeypatch):
 def test_unknown_stage_and_broken_source_are_refused(tmp_path):
     with pytest.raises(FileNotFoundError):
         stage_code("bake", str(tmp_path))
-    root = tree(tmp_path, {"stages/bake.py": "from lib.a import (b,\n"})
+    root = tree(tmp_path, {"stages/bake.py": "from lib.a import (b,\n", "lib/a.py": ""})
     with pytest.raises(SyntaxError):
         stage_code("bake", root)
 
