@@ -142,6 +142,19 @@ def test_black_walls_and_pure_red_pictures(tmp_path):
     assert not out.final.map(1)[..., 2].any()
 
 
+def test_chunks_and_their_order_do_not_matter(tmp_path):
+    maps, _, options = build(tmp_path)
+    run(tmp_path, options)
+    whole = (tmp_path / "out.npz").read_bytes()
+    for k, stats in enumerate(({}, {"wall": {"depth": 1}})):
+        one = pack(maps.surface[k : k + 1], maps.roots[k : k + 1], maps.level[k : k + 1], [maps.map(k)])
+        light_maps.save(tmp_path / f"{k}.npz", light_maps.LightMaps(one, stats))
+    for order in ("01", "10"):
+        files = [str(tmp_path / f"{k}.npz") for k in order]
+        run(tmp_path, [*options[:3], *files, *options[4:]])
+        assert (tmp_path / "out.npz").read_bytes() == whole
+
+
 def test_same_input_same_bytes(tmp_path):
     _, _, options = build(tmp_path)
     files = ["out.npz", "maps/001-painted.exr", "maps/002-wall.exr"]
