@@ -25,7 +25,7 @@ def read(text, report, only=None, trimmed="refuse"):
     """Read the text of a geomdl JSON file as a GeometryFile; mistakes go to `report` (see patches)."""
     records = _records(_parse(text, report), report)
     report.total = len(records)
-    patches, skipped, labels_seen = [], 0, []
+    patches, skipped, labels_seen = [], [], []
     for number, record in enumerate(records, 1):
         labels = _labels(record, number, len(records))
         labels_seen.append(labels[0])
@@ -33,7 +33,7 @@ def read(text, report, only=None, trimmed="refuse"):
             continue
         if isinstance(record, dict) and record.get("trims"):
             if trimmed == "skip":
-                skipped += 1
+                skipped.append(number)
             else:
                 report.add("the surface is trimmed; `trimmed: skip` leaves trimmed surfaces out", number, "trims")
             continue
@@ -43,8 +43,8 @@ def read(text, report, only=None, trimmed="refuse"):
         report.add(
             f"no surface left to read; the file holds {', '.join(labels_seen[:12])}", field="only" if only else None
         )
-    notes = [f"{skipped} trimmed surface{'s' * (skipped > 1)} skipped"] if skipped else []
-    return GeometryFile(patches, len(records), notes=notes)
+    notes = [f"skipped: {len(skipped)} trimmed surface{'s' * (len(skipped) > 1)}"] if skipped else []
+    return GeometryFile(patches, len(records), notes=notes, trimmed=skipped)
 
 
 def _labels(record, number, total):

@@ -32,12 +32,14 @@ class GeometryFile:
     total : how many patches the file counts, those that were not selected included; it fixes the padding of names
     metres : length of the file's unit [m], None if the file states none
     notes : one sentence per kind of thing that was skipped
+    trimmed : numbers of the trimmed surfaces that were skipped
     """
 
     patches: list
     total: int
     metres: float | None = None
     notes: list = field(default_factory=list)
+    trimmed: list = field(default_factory=list)
 
 
 @dataclass

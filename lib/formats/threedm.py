@@ -55,26 +55,28 @@ def read(data, report, only=None, trimmed="refuse"):
     report.total = len(faces)
     if not faces:
         report.fatal(f"holds no visible surface{_found(skipped)}")
-    patches = _patches(faces, report, only, trimmed, skipped)
+    patches, left_out = _patches(faces, report, only, trimmed)
+    skipped["trimmed face"] += len(left_out)
     if not patches and not len(report.mistakes):
         known = dict.fromkeys(label for _, labels in faces for label in labels)
         what = f"no face matches '{only}'" if only else "every face is trimmed, and `trimmed: skip` leaves them out"
         report.add(
             f"{what}; layers and objects: {listed(known) or 'none are named'}", field="only" if only else "trimmed"
         )
-    notes = [f"skipped: {_summary(skipped)}"] if skipped else []
-    return GeometryFile(patches, len(faces), METRES.get(model.Settings.ModelUnitSystem.name), notes)
+    notes = [f"skipped: {_summary(skipped)}"] if +skipped else []
+    return GeometryFile(patches, len(faces), METRES.get(model.Settings.ModelUnitSystem.name), notes, left_out)
 
 
-def _patches(faces, report, only, trimmed, skipped):
-    patches = []
+def _patches(faces, report, only, trimmed):
+    """Patches of the selected whole faces, and the numbers of the trimmed ones that are skipped."""
+    patches, left_out = [], []
     for number, (face, labels) in enumerate(faces, 1):
         labels = (*labels, str(number), names.padded(number, len(faces)))
         if only is not None and not any(fnmatch.fnmatchcase(label, only) for label in labels):
             continue
         if not _is_whole(face):
             if trimmed == "skip":
-                skipped["trimmed face"] += 1
+                left_out.append(number)
             else:
                 what = "is a trimmed face; `trimmed: skip` leaves trimmed faces out, `only` selects layers and objects"
                 report.add(f"{what} (it is on layer {labels[0]})", number)
@@ -82,7 +84,7 @@ def _patches(faces, report, only, trimmed, skipped):
         surface = report.surface(lambda face=face: _nurbs(face), number)
         if surface is not None:
             patches.append(Patch(number, surface, bool(getattr(face, "OrientationIsReversed", False)), labels))
-    return patches
+    return patches, left_out
 
 
 class _Layers:

@@ -91,7 +91,7 @@ def test_trimmed_surfaces_are_refused_by_name_or_skipped(tmp_path):
         == "a.json: surface arch/1: trims: the surface is trimmed; `trimmed: skip` leaves trimmed surfaces out"
     )
     content = read(path, trimmed="skip")
-    assert [patch.number for patch in content.patches] == [2] and content.notes == ["1 trimmed surface skipped"]
+    assert [patch.number for patch in content.patches] == [2] and content.notes == ["skipped: 1 trimmed surface"]
 
 
 def points(**at):
