@@ -5,7 +5,10 @@ Cohen et al. 1988 in batches (Southwell's method, Gortler et al. 1994), overshoo
     P_i = area_i sum |dB_i|                      unshot power
     shoot every i with P_i >= 0.1 max P:   x_i = dB_i + c rho_i A_amb
     H_j += x_i F_ij area_i / area_j,  dB_j += rho_j (the same),  dB_i -= x_i
-    A_amb = 1 / (1 - rho_avg) sum dB_j area_j / sum area
+    A_amb = k / (1 - k rho_avg) sum dB_j area_j / sum area,   k the share of rays that meet an element
+
+k is ours (the source is for closed rooms, k = 1): in an open scene most light never comes back, and overshooting as if it
+did makes the unshot light swing for ever.
 
 then  H_i = H_direct,i + sum_j F_ij rho_j H_j  until the change, summed as a geometric series, is small.
 Shooting deposits light through single rays, and small elements collect noise that feeds back; the sweeps take it out again.
@@ -86,7 +89,7 @@ def solve(H_direct, rho, area, F, residual=1e-3, bounces=None):
     if bounces is not None:
         return _reflect(flat, rho_flat, area, F, bounces, G)
     H, dB, history, ledger, shots = _shoot(flat, rho_flat, area, F, residual)
-    ambient = _ambient(dB, rho_flat, area)
+    ambient = _ambient(dB, rho_flat, area, F)
     H, sweeps = _sweep(flat, H, rho_flat, F, residual)
     gathered, shot = (rho_flat * H * area[:, None]).sum(axis=0), ledger.pop("reflected")
     ledger["residue"] = gathered - shot
@@ -127,7 +130,7 @@ def _shoot(H_direct, rho, area, F, residual):
             break
         power = np.abs(dB * column).sum(axis=1)
         bright = power >= BRIGHT * power.max()
-        x = np.where(bright[:, None], dB + OVERSHOOT * rho * _ambient(dB, rho, area), 0.0)
+        x = np.where(bright[:, None], dB + OVERSHOOT * rho * _ambient(dB, rho, area, F), 0.0)
         sent = x * column
         arrived = F.scatter(sent)
         arrived *= inverse > 0
@@ -155,11 +158,12 @@ def _shoot(H_direct, rho, area, F, residual):
     return H, dB, np.array(history), ledger, shots
 
 
-def _ambient(dB, rho, area):
-    """Mean unshot radiosity times the gain of all its reflections, (C,)."""
+def _ambient(dB, rho, area, F):
+    """Irradiance the unshot light will still bring, on the mean over the elements, (C,)."""
     total = max(area.sum(), 1e-300)
     rho_avg = (rho * area[:, None]).sum(axis=0) / total
-    return np.minimum(1 / np.maximum(1 - rho_avg, 1 / MOST_GAIN), MOST_GAIN) * (dB * area[:, None]).sum(axis=0) / total
+    met = ((1 - F.escaped - F.absorbed) * area).sum() / total
+    return met / np.maximum(1 - met * rho_avg, 1 / MOST_GAIN) * (dB * area[:, None]).sum(axis=0) / total
 
 
 def _sweep(H_direct, H, rho, F, residual):
