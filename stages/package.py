@@ -44,7 +44,8 @@ def body(args, cost):
 
     exposure = chosen_exposure(args.settings.get("exposure", "auto"), maps, shapes.area)
     extras = {"unit": "B_over_pi", "encoding": "srgb", "exposure": exposure}
-    materials = [look(s, x, maps, rho_avg, exposure, ambient(maps, shapes.area), results) for s in range(len(x.names))]
+    H = ambient(maps, shapes.area)
+    materials = [look(s, x, maps, rho_avg, exposure, H, results) for s in range(len(x.names))]
 
     origin = shapes.centre if np.abs(shapes.centre).max() > FAR * shapes.scale else np.zeros(3)
     origin = gltf.y_up(origin, x.up).astype(np.float32).astype(np.float64)
