@@ -37,7 +37,7 @@ def body(args, cost):
     if args.half == "direct":
         x = samples.load(args.samples)
         done, spared = refine_direct(
-            world, unpacked(x, world), chosen["seed"], tau, chosen["top"], x.level, chosen["shadow_rays"]
+            world, unpacked(x, world), chosen["seed"], tau, chosen["top"], chosen["shadow_rays"]
         )
         cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))
     elif chosen["bounces"] == 1:
@@ -54,11 +54,11 @@ def body(args, cost):
 
 
 def unpacked(x, world):
-    """{surface: (value, hidden, penumbra)} on the base lattices of a chunk of sample."""
+    """{surface: (value, hidden, penumbra, level)} on the base lattices of a chunk of sample."""
     out = {}
     for k, s in enumerate(x.surface):
-        part, shape = slice(x.first[k], x.first[k + 1]), world.lattices[s].shape(x.level)
-        out[int(s)] = x.value[part].reshape(*shape, -1), x.hidden[part].reshape(shape), x.penumbra[part].reshape(shape)
+        part, shape = slice(x.first[k], x.first[k + 1]), world.lattices[s].shape(x.level[k])
+        out[int(s)] = x.value[part].reshape(*shape, -1), x.hidden[part].reshape(shape), x.penumbra[part].reshape(shape), int(x.level[k])
     return out
 
 

@@ -36,22 +36,22 @@ def body(args, cost):
     rays = 0 if chosen["bounces"] == 1 else chosen["rays_per_element"]
     lit = [s for s in mine if grids.n_u[s]]
     elements = [surface_elements(world, s, seed, grids, rays, base[s]) for s in lit]
-    samples.save(args.out, packed(mine, level, base, lit, elements, grids, world.n_groups))
+    samples.save(args.out, packed(mine, base, lit, elements, grids, world.n_groups))
     cost.rays = world.tracer.rays
     cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))
     cost.notes["hidden_points"] = int(sum(e.rows.is_hidden.sum() for e in elements))
 
 
-def packed(surfaces, level, base, lit, elements, grids, groups):
+def packed(surfaces, base, lit, elements, grids, groups):
     """Samples from per-surface pieces."""
-    lattices = [base[s] for s in surfaces]
+    lattices, levels = [base[s][:3] for s in surfaces], [base[s][3] for s in surfaces]
     fields = [np.concatenate([np.zeros((0, *a[0].shape[2:]), a[0].dtype), *(x.reshape(-1, *x.shape[2:]) for x in a)])
               for a in zip(*lattices, strict=True)] or [np.zeros((0, 3 * groups), np.float32), np.zeros(0, bool), np.zeros(0, bool)]
     rows = [e.rows for e in elements]
     width = rows[0].entries.shape[1] if rows else 1
     return samples.Samples(
         np.asarray(surfaces, dtype=np.int32),
-        level,
+        np.array(levels, dtype=np.int32),
         np.cumsum([0, *(x[1].size for x in lattices)]),
         *fields,
         np.concatenate([np.zeros(0, np.int32), *(np.arange(grids.first[s], grids.first[s + 1], dtype=np.int32) for s in lit)]),

@@ -12,18 +12,22 @@ from lib.elements.balance import balance, children
 
 WIDE, WIDE_LEVELS = 1.0, 2  # root-cell widths; levels below the base
 
+SMALLEST_CELL = 1e-3  # of the scene's largest side: finer than anybody sees
+FULL_CELL, SLACK = 1 / 16, 0.5
+
 
 class Quadtree:
     """State of one tree.
 
-    lattice : Lattice; level : of the arrays below, which hold the whole lattice of that level
+    lattice : Lattice; side : length of a root cell in the scene's frame
+    level : of the arrays below, which hold the whole lattice of that level
     value (h, w, C) float32, known, hidden (h, w) bool, noise (h, w) float32 standard error of the sample,
-        reach (h, w) float32 free space above it in root cells, inf where nobody asked
+        reach (h, w) float32 free space above it in the scene's frame, inf where nobody asked
     divided : list of (n_v 2^l, n_u 2^l) bool for l < level
     """
 
-    def __init__(self, lattice, base, channels):
-        self.lattice, self.base, self.level = lattice, base, base
+    def __init__(self, lattice, base, channels, side=1.0):
+        self.lattice, self.base, self.level, self.side = lattice, base, base, side
         shape = lattice.shape(base)
         self.value = np.zeros((*shape, channels), dtype=np.float32)
         self.noise = np.zeros(shape, dtype=np.float32)
@@ -50,7 +54,10 @@ class Quadtree:
         """Divide leaves above the threshold tau, up to level `top`; balance.  Returns True when new samples are wanted."""
         divided = [*self.divided, *(np.zeros(self.lattice.cells(self.level), dtype=bool) for _ in range(self.level < top))]
         for level in range(self.base, len(divided)):
-            divided[level] |= self._exceeds(level, tau) & self._exists(level)
+            cell = self.side * 2.0**-level
+            if cell > SMALLEST_CELL:
+                slack = max(1.0, (FULL_CELL / cell) ** SLACK)
+                divided[level] |= self._exceeds(level, tau * slack) & self._exists(level)
         divided = balance(divided, self.lattice.closed)
         if not any((new & ~old).any() for new, old in zip(divided, self._padded(divided), strict=True)):
             return False
@@ -81,7 +88,7 @@ class Quadtree:
         step = 2 ** (self.level - level)
         reach = self.reach[::step, ::step]
         least = np.minimum.reduce([reach[:-1, :-1], reach[:-1, 1:], reach[1:, :-1], reach[1:, 1:]])
-        return 2.0**-level > WIDE * least
+        return self.side * 2.0**-level > WIDE * least
 
     def contrast(self, level):
         """Largest difference between visible corners of each cell of a level, over channels: (rows, columns)."""

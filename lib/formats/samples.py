@@ -13,14 +13,14 @@ KIND, VERSION = "samples", 1
 class Samples:
     """One chunk.
 
-    surface (m,) int32 surfaces with maps, ascending; level, the base level of the direct trees
+    surface (m,) int32 surfaces with maps, ascending; level (m,) int32, base level of their direct trees
     first (m + 1,) int64 offsets of their lattices in value (N, 3 G) float32 [W/m^2], hidden, penumbra (N,) bool
     element (k,) int32 global numbers; entries (k, R) int32; is_hidden (k, 16) bool; area (k,) float64 visible area in frame units;
     H_direct (k, G, 3) float64 [W/m^2]
     """
 
     surface: np.ndarray
-    level: int
+    level: np.ndarray
     first: np.ndarray
     value: np.ndarray
     hidden: np.ndarray
@@ -32,7 +32,7 @@ class Samples:
     H_direct: np.ndarray
 
 
-ARRAYS = [name for name in Samples.__dataclass_fields__ if name != "level"]
+ARRAYS = list(Samples.__dataclass_fields__)
 
 
 def check(x):
@@ -50,12 +50,11 @@ def check(x):
 def save(path, x):
     """Write a chunk."""
     check(x)
-    artefact.write(path, KIND, VERSION, {"level": x.level}, {name: getattr(x, name) for name in ARRAYS})
+    artefact.write(path, KIND, VERSION, {}, {name: getattr(x, name) for name in ARRAYS})
 
 
 def load(path):
     """Read a chunk; ArtefactError when it is damaged."""
-    header, arrays = artefact.read(path, KIND, VERSION)
-    x = Samples(level=header["level"], **arrays)
+    x = Samples(**artefact.read(path, KIND, VERSION)[1])
     check(x)
     return x

@@ -30,14 +30,14 @@ def refine(world, trees, sample, seed, tau, top):
         active = [s for s in active if trees[s].split(tau[s], top)]
 
 
-def refine_direct(world, base, seed, tau, top, level, shadow_rays):
+def refine_direct(world, base, seed, tau, top, shadow_rays):
     """Direct trees from their base lattices.
 
-    base : {surface: (value (h, w, C), hidden, penumbra)} on `level`.  Returns {surface: Quadtree} and counts of spared rays.
+    base : {surface: (value (h, w, C), hidden, penumbra, level)}.  Returns {surface: Quadtree} and counts of spared rays.
     """
     trees, spared = {}, np.zeros(3, dtype=np.int64)
-    for s, (value, hidden, _) in base.items():
-        trees[s] = Quadtree(world.lattices[s], level, world.channels)
+    for s, (value, hidden, _, level) in base.items():
+        trees[s] = Quadtree(world.lattices[s], level, world.channels, world.side(s))
         own = trees[s].wanted()
         trees[s].put(value[own], hidden[own], 0.0, np.inf)
 
@@ -53,13 +53,11 @@ def refine_direct(world, base, seed, tau, top, level, shadow_rays):
 
 def refine_indirect(world, surfaces, table, seed, tau, top, level, K):
     """Indirect trees of `surfaces`, by K gather rays a sample through the LookupTable: {surface: Quadtree}."""
-    trees = {s: Quadtree(world.lattices[s], level, world.channels) for s in surfaces}
-    side = np.array([max(e) for e in world.casters.extent], dtype=np.float32)
-    side /= [max(lattice.roots) for lattice in world.lattices]
+    trees = {s: Quadtree(world.lattices[s], world.base_level(s, level), world.channels, world.side(s)) for s in surfaces}
 
     def sample(points):
         light = indirect_light(points.x, points.N, points.shift, K, world.tracer, world.mesh, table, world.channels)
-        return light.H, light.hidden, light.noise, light.reach / side[points.surface]
+        return light.H, light.hidden, light.noise, light.reach
 
     refine(world, trees, sample, f"{seed} indirect", tau, top)
     return trees

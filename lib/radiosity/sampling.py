@@ -67,21 +67,25 @@ def hidden_at(world, x, N, shifts):
 
 
 def base_lattice(world, surfaces, seed, level, shadow_rays):
-    """Direct light on the base lattices: {surface: (value (h, w, 3 G), hidden, penumbra (h, w))} and DirectLight's counts."""
-    wanted = {s: np.nonzero(world.lattices[s].is_own(level)) for s in surfaces}
+    """Direct light on the base lattices: {surface: (value (h, w, 3 G), hidden, penumbra (h, w), level)} and DirectLight's counts.
+
+    level : of large surfaces; smaller ones begin coarser.
+    """
+    level_of = {s: world.base_level(s, level) for s in surfaces}
+    wanted = {s: np.nonzero(world.lattices[s].is_own(level_of[s])) for s in surfaces}
     if not wanted:
         return {}, (0, 0, 0)
-    points = points_at(world, seed, wanted, dict.fromkeys(surfaces, level))
+    points = points_at(world, seed, wanted, level_of)
     light, hidden = direct_at(world, points, shadow_rays)
     out, first = {}, 0
     for s, (j, i) in wanted.items():
         part = slice(first, first + len(j))
         first += len(j)
-        shape = world.lattices[s].shape(level)
+        shape = world.lattices[s].shape(level_of[s])
         value = np.zeros((*shape, world.channels), dtype=np.float32)
         shade, penumbra = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
         value[j, i], shade[j, i], penumbra[j, i] = light.H[part].reshape(len(j), -1), hidden[part], light.is_penumbra[part]
-        out[s] = tuple(world.lattices[s].copy_own(array) for array in (value, shade, penumbra))
+        out[s] = (*(world.lattices[s].copy_own(array) for array in (value, shade, penumbra)), level_of[s])
     return out, (light.below_horizon, light.dim, light.agreed)
 
 
@@ -97,7 +101,7 @@ class Elements:
 def surface_elements(world, s, seed, grids, R, base):
     """Elements of surface s: their points, rows and direct light.
 
-    base : (value, hidden, _) of the surface's base lattice; R rays per element, 0 casts none (one bounce).
+    base : (value, hidden, ...) of the surface's base lattice; R rays per element, 0 casts none (one bounce).
     """
     n_u, n_v = int(grids.n_u[s]), int(grids.n_v[s])
     surface = world.surface(s)
@@ -115,7 +119,7 @@ def surface_elements(world, s, seed, grids, R, base):
         rows = Rows(np.full((len(x), 1), -1, dtype=np.int32), np.zeros(density.shape, dtype=bool))
     visible = ~rows.is_hidden
     area = (density * visible).mean(axis=1) / (n_u * n_v)
-    value, hidden, _ = base
+    value, hidden = base[:2]
     light = by_element(_bilinear(one_deep(value, hidden, world.lattices[s].closed), u, v))
     count = np.maximum(visible.sum(axis=1), 1)[:, None]
     return Elements(rows, area, (light * visible[..., None]).sum(axis=1) / count)

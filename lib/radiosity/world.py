@@ -13,6 +13,7 @@ from lib.visibility.mesh_lookup import MeshLookup
 from lib.visibility.tracer import Tracer
 
 FINEST = 10  # lattice positions are hashed on this level's lattice: a crossing draws the same rays at whatever level it is met
+LARGE = 0.25  # root cells from this side on, in the scene's largest side, start their trees in full
 
 
 class World:
@@ -41,6 +42,14 @@ class World:
     def surface(self, s):
         """Surface s in the scene's frame."""
         return transformed(self.scene.surfaces[s], self._frame)
+
+    def side(self, s):
+        """Mean side of a root cell of surface s along its longer direction, in the scene's frame."""
+        return float(max(self.casters.extent[s])) / max(self.lattices[s].roots)
+
+    def base_level(self, s, level):
+        """Level at which the trees of surface s begin: `level` on large surfaces, less on those with small cells anyway."""
+        return int(np.clip(level + np.round(np.log2(self.side(s) / LARGE)), 1, level))
 
     @cached_property
     def emitters(self):
