@@ -30,15 +30,25 @@ class Cost:
     def as_dict(self):
         """The JSON record: wall and CPU seconds of this process (children included), peak memory in MB, rays."""
         usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+        peak = _own_peak_kb() or usage[0].ru_maxrss
         return {
             "stage": self.stage,
             "seconds": round(time.monotonic() - self.started, 4),
             "cpu_seconds": round(sum(u.ru_utime + u.ru_stime for u in usage), 4),
-            "peak_mb": round(max(u.ru_maxrss for u in usage) / 1024, 1),
+            "peak_mb": round(max(peak, usage[1].ru_maxrss) / 1024, 1),
             "rays": int(self.rays),
             "notes": self.notes,
             "run": os.environ.get("BAKE_RUN", ""),
         }
+
+
+def _own_peak_kb():
+    """Peak memory of this process [kB], 0 where /proc does not tell; getrusage's is that of its parent if larger."""
+    try:
+        with open("/proc/self/status", encoding="ascii") as file:
+            return next((int(line.split()[1]) for line in file if line.startswith("VmHWM:")), 0)
+    except OSError:
+        return 0
 
 
 class _Log:

@@ -17,7 +17,7 @@ MOST_THUMBNAILS = 160
 
 def draw(bake, facts, settings):
     """Pictures of the levels and maps, and what the viewer shows."""
-    view, levels, hero, documents, textures = None, [], None, [], {}
+    view, near, levels, hero, documents, textures = None, None, [], None, [], {}
     given = settings.get("camera")
     for level in facts["levels"]:
         path = bake.folder / level["file"]
@@ -25,8 +25,9 @@ def draw(bake, facts, settings):
         model = picture.join(parts)
         if view is None:
             view = scene_camera(given, settings) if given else cameras.automatic(model)
+            near = cameras.closer(model, view, *SMALL)
             hero = png(picture.render(model, loaded, view, *HERO))
-        levels.append(tuple(png(shot) for shot in picture.render_with_edges(model, loaded, view, *SMALL)))
+        levels.append(tuple(png(shot) for shot in picture.render_with_edges(model, loaded, near, *SMALL)))
         inlined = exported.inlined(path)
         if inlined and documents is not None:
             documents.append(inlined[0])

@@ -276,6 +276,7 @@ def seams(figures):
         ("neighbour", "t", lambda r: escape(str(r["b"]))),
         ("largest step [W/m\u00b2]", "n", lambda r: number(r["worst"])),
         ("of mean light", "n", lambda r: share(r["relative"])),
+        ("RMS step [W/m\u00b2]", "n", lambda r: number(r["rms"])),
     ]
     note = (
         "Borders that two surfaces share smoothly, worst first: the largest difference of irradiance between their "

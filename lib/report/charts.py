@@ -46,7 +46,7 @@ def convergence(shots, unshot, target=None):
     if target:
         parts.append(
             f'<line class="target" x1="{left}" x2="{width - right}" y1="{py(target):.1f}" y2="{py(target):.1f}"/>'
-            f'<text class="tick target" x="{width - right}" y="{py(target) - 5:.1f}" text-anchor="end">'
+            f'<text class="tick target" x="{left + 8}" y="{py(target) - 5:.1f}">'
             f"stop at {target:g}</text>"
         )
     line = " ".join(f"{px(x):.1f},{py(y):.1f}" for x, y in points)

@@ -32,6 +32,8 @@ SAVINGS = {
     "levels_dropped": ("deepest levels dropped before writing, all within a quarter of the tolerance", "levels"),
 }
 
+COUNTED = {*SAVINGS, "hidden_points", "levels_removed", "textured_surfaces", "skipped"}
+
 
 def stage_costs(costs, run):
     """One row a stage in the order of the pipeline: seconds, CPU seconds, rays summed over its jobs, the largest peak.
@@ -73,11 +75,16 @@ def stage_costs(costs, run):
 
 
 def notes(costs):
-    """Numbers the jobs noted, summed by name."""
+    """Counts the jobs noted (`COUNTED`), summed by name."""
     total = {}
     for c in costs:
         for key, value in (c.get("notes") or {}).items():
-            if isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value):
+            if (
+                key in COUNTED
+                and isinstance(value, int | float)
+                and not isinstance(value, bool)
+                and math.isfinite(value)
+            ):
                 total[key] = total.get(key, 0) + value
     return total
 

@@ -143,7 +143,7 @@ def render_with_edges(model, textures, camera, width, height, samples=2, backgro
     plain = _developed(image, height, width, samples)
     if not edges:
         return plain, plain
-    image[_borders(seen)] *= 1 - edges
+    image[borders(seen)] *= 1 - edges
     return plain, _developed(image, height, width, samples)
 
 
@@ -197,7 +197,7 @@ def _wrap(k, n, how):
     return k % n
 
 
-def _borders(seen):
+def borders(seen):
     """Pixels whose right or lower neighbour shows another triangle."""
     border = np.zeros(seen.shape, bool)
     border[:, :-1] |= seen[:, :-1] != seen[:, 1:]

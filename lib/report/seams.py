@@ -20,10 +20,10 @@ def line(value, hidden, side):
 
 
 def step(first, second, is_reversed):
-    """The largest difference between two lines (values (n, 3), hidden (n,)) over the same border.
+    """The largest and the root mean square difference between two lines (values (n, 3), hidden (n,)) over one border.
 
     Both are read at the crossings of the finer; a place one of whose samples is hidden is left out.
-    Returns a number >= 0, nan where nothing can be compared.
+    Returns two numbers >= 0, nan where nothing can be compared.
     """
     (a, a_hidden), (b, b_hidden) = first, second
     if is_reversed:
@@ -31,7 +31,10 @@ def step(first, second, is_reversed):
     n = max(len(a), len(b))
     (a, a_bad), (b, b_bad) = _read(a, a_hidden, n), _read(b, b_hidden, n)
     seen = ~(a_bad | b_bad)
-    return float(np.abs(a - b)[seen].max()) if seen.any() else float("nan")
+    if not seen.any():
+        return float("nan"), float("nan")
+    difference = np.abs(a - b)[seen].max(axis=1)
+    return float(difference.max()), float(np.sqrt((difference**2).mean()))
 
 
 def is_smooth(first, second):
@@ -48,7 +51,7 @@ def border_uv(side, is_reversed=False, n=PROBES):
 
 
 def rows(scene, casters, maps, mean_H):
-    """Steps of irradiance along borders that are smooth in space, the worst first: dicts a, b, worst, relative.
+    """Steps of irradiance along borders that are smooth in space, the worst first: dicts a, b, worst, rms, relative.
 
     maps : MapSet of H (N, G, 3), or None; borders between surfaces without maps are left out
     """
@@ -68,7 +71,7 @@ def rows(scene, casters, maps, mean_H):
         for k in (ka, kb):
             if k not in total:
                 total[k] = maps.map(k).sum(axis=2)
-        worst = step(
+        worst, rms = step(
             line(total[ka], maps.hidden_map(ka), side_a), line(total[kb], maps.hidden_map(kb), side_b), is_reversed
         )
         if np.isfinite(worst):
@@ -77,6 +80,7 @@ def rows(scene, casters, maps, mean_H):
                     "a": scene.names[a],
                     "b": scene.names[b],
                     "worst": worst,
+                    "rms": rms,
                     "relative": worst / mean_H if mean_H > 0 else None,
                 }
             )

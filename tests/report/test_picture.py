@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lib.maps.colour import srgb_to_linear
-from lib.report.camera import Camera, automatic
+from lib.report.camera import Camera, automatic, closer
 from lib.report.picture import Part, Texture, join, lookup, render, render_with_edges
 
 SQUARE = np.array([[0.0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]])
@@ -97,3 +97,17 @@ def test_automatic_camera_stands_inside_a_room_and_outside_an_object():
     assert (np.array(inside.eye) > 0).all() and (np.array(inside.eye) < [4, 3, 5]).all()
     outside = automatic(join([Part(p.V, p.F[:, ::-1]) for p in room()]))
     assert (np.array(outside.eye) < 0).any() or (np.array(outside.eye) > [4, 3, 5]).any()
+
+
+def test_a_closer_look_goes_to_the_finely_divided_part():
+    n = 12
+    t = np.arange(n + 1) / n
+    V = np.stack([0.8 + 0.1 * np.tile(t, n + 1), 0.8 + 0.1 * np.repeat(t, n + 1), np.full((n + 1) ** 2, 0.01)], axis=1)
+    i = (np.arange(n)[:, None] * (n + 1) + np.arange(n)).ravel()
+    F = np.concatenate([np.stack([i, i + 1, i + n + 2], 1), np.stack([i, i + n + 2, i + n + 1], 1)])
+    near = closer(join([Part(SQUARE, TRIANGLES), Part(V, F)]), STRAIGHT, 100, 100)
+    assert near.eye == STRAIGHT.eye and near.fov < 30
+    direction = np.subtract(near.target, near.eye)
+    at = np.array(near.eye) - direction * near.eye[2] / direction[2]
+    assert at[:2] == pytest.approx([0.8, 0.8], abs=0.15)
+    assert closer(join([Part(SQUARE, TRIANGLES)]), STRAIGHT, 100, 100) == STRAIGHT

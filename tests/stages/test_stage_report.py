@@ -275,7 +275,7 @@ def test_figures(results):
 
 def test_the_worst_seam_is_the_step_between_the_halves(results):
     seams = json.loads((results / "report.json").read_text())["seams"]
-    assert seams == [{"a": NAMES[0], "b": NAMES[1], "worst": 0.5, "relative": 0.25}]
+    assert seams == [{"a": NAMES[0], "b": NAMES[1], "worst": 0.5, "rms": 0.5, "relative": 0.25}]
 
 
 def test_the_page_is_whole_and_names_are_text(results):
