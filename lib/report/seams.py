@@ -57,34 +57,37 @@ def rows(scene, casters, maps, mean_H):
     """
     if maps is None:
         return []
-    total, listed = {}, []
+    sides, steps = {}, []
     for a, side_a, b, side_b, is_reversed in casters.borders.tolist():
-        ka, kb = maps.position(a), maps.position(b)
-        if ka < 0 or kb < 0 or casters.is_collapsed[a, side_a] or casters.is_collapsed[b, side_b]:
+        if casters.is_collapsed[a, side_a] or casters.is_collapsed[b, side_b]:
             continue
+        pair = [_side(sides, maps, s, side) for s, side in ((a, side_a), (b, side_b))]
+        if None not in pair:
+            worst, rms = step(*pair, is_reversed)
+            if np.isfinite(worst):
+                steps.append((-worst, rms, a, side_a, b, side_b, bool(is_reversed)))
+    # Ask from the worst down which borders are smooth: normals cost more than steps, and few are listed.
+    listed = []
+    for negative, rms, a, side_a, b, side_b, is_reversed in sorted(steps):
         N = [
             normal(scene.surfaces[s], *border_uv(side, turned)) * (-1 if scene.flip[s] else 1)
-            for s, side, turned in ((a, side_a, False), (b, side_b, bool(is_reversed)))
+            for s, side, turned in ((a, side_a, False), (b, side_b, is_reversed))
         ]
-        if not is_smooth(*N):
-            continue
-        for k in (ka, kb):
-            if k not in total:
-                total[k] = maps.map(k).sum(axis=2)
-        worst, rms = step(
-            line(total[ka], maps.hidden_map(ka), side_a), line(total[kb], maps.hidden_map(kb), side_b), is_reversed
-        )
-        if np.isfinite(worst):
-            listed.append(
-                {
-                    "a": scene.names[a],
-                    "b": scene.names[b],
-                    "worst": worst,
-                    "rms": rms,
-                    "relative": worst / mean_H if mean_H > 0 else None,
-                }
-            )
-    return sorted(listed, key=lambda r: (-r["worst"], r["a"], r["b"]))[:MOST]
+        if is_smooth(*N):
+            row = {"a": scene.names[a], "b": scene.names[b], "worst": -negative, "rms": rms}
+            listed.append({**row, "relative": -negative / mean_H if mean_H > 0 else None})
+        if len(listed) == MOST:
+            break
+    return listed
+
+
+def _side(known, maps, s, side):
+    """One side of the map of surface s, light groups summed; None where it has no map."""
+    if (s, side) not in known:
+        k = maps.position(s)
+        value, hidden = line(maps.map(k), maps.hidden_map(k), side) if k >= 0 else (None, None)
+        known[s, side] = (value.sum(axis=1), hidden) if k >= 0 else None
+    return known[s, side]
 
 
 def _read(value, hidden, n):
