@@ -8,6 +8,7 @@ from lib.formats.patches import Report
 from lib.refusal import refusal
 
 MAX_BYTES = 512 << 20
+MAX_TEXT = 48 << 20  # text takes some ten times its size in memory while it is read
 KINDS = {".bpt": "Bezier patches", ".txt": "Bezier patches (teaset)", ".json": "geomdl JSON", ".3dm": "Rhino"}
 
 
@@ -25,7 +26,7 @@ def read(path, file, name, only=None, trimmed="refuse"):
     if kind not in KINDS:
         allowed = ", ".join(f"{suffix} ({what})" for suffix, what in KINDS.items())
         raise refusal(f"files of kind '{kind}' are not read; allowed: {allowed}", file, name, "file")
-    data = read_bytes(path, file, name)
+    data = read_bytes(path, file, name, MAX_BYTES if kind == ".3dm" else MAX_TEXT)
     report = Report(Mistakes(), file, name)
     if kind == ".3dm":
         from lib.formats import threedm
@@ -43,19 +44,19 @@ def read(path, file, name, only=None, trimmed="refuse"):
     return content
 
 
-def read_bytes(path, file, name, what="file"):
-    """The bytes of a file; Refusal if it is missing, not a file, empty or too large (checked before reading)."""
+def read_bytes(path, file, name, most=MAX_BYTES):
+    """The bytes of a file; Refusal if it is missing, not a file, empty or larger than `most` (checked first)."""
     try:
         if not path.is_file():
-            raise refusal("is not a file" if path.exists() else "no such file", file, name, what)
+            raise refusal("is not a file" if path.exists() else "no such file", file, name, "file")
         size = path.stat().st_size
         if size == 0:
-            raise refusal("is empty", file, name, what)
-        if size > MAX_BYTES:
-            raise refusal(f"{size >> 20} MiB; allowed: at most {MAX_BYTES >> 20} MiB", file, name, what)
+            raise refusal("is empty", file, name, "file")
+        if size > most:
+            raise refusal(f"{size >> 20} MiB; allowed: at most {most >> 20} MiB", file, name, "file")
         return path.read_bytes()
     except OSError as error:
-        raise refusal(f"cannot be read: {error.strerror}", file, name, what) from None
+        raise refusal(f"cannot be read: {error.strerror}", file, name, "file") from None
 
 
 def text(data, file):

@@ -69,7 +69,9 @@ def load(folder, overrides=None, results_root="results"):
 
     Raises Refusal, which lists every mistake, ArtefactError where results can not be written.
     """
-    given = Path(folder)
+    if folder in (None, ""):
+        raise refusal("names no folder; expected scene=FOLDER", field="scene")
+    given = Path(str(folder))
     given = given.parent if given.name == "scene.yaml" else given
     absolute = Path(os.path.realpath(given))
     name = _cleaned(absolute.name)

@@ -71,7 +71,7 @@ def load(entries, units, folder, file, where=None):
         placed += _placed(entry, index, parts, total, to_units, areas, mistakes, where)
     _check_names(placed, mistakes, where)
     mistakes.stop()
-    return placed, notes
+    return placed, list(dict.fromkeys(notes))
 
 
 def _read(entry, folder, file):
@@ -117,11 +117,11 @@ def _uniform(degree, n):
 
 def _check_corners(corners):
     """ValueError if the corners of a quadrangle are concave or cross: it would fold over itself."""
+    corners = (corners - corners[0]) / max(np.abs(corners - corners[0]).max(), 1e-300)
     ahead, back = np.roll(corners, -1, axis=0) - corners, np.roll(corners, 1, axis=0) - corners
     N = np.cross(ahead, back)
-    size = np.abs(corners - corners[0]).max() ** 2
     crossed = np.linalg.norm(N.sum(axis=0)) < 1e-9 * np.linalg.norm(N, axis=1).sum()
-    if crossed or (N @ N.sum(axis=0) < -1e-9 * size * size).any():
+    if crossed or (N @ N.sum(axis=0) < -1e-9).any():
         raise ValueError("quadrangle: the corners cross or are concave; expected a convex round trip of four corners")
 
 

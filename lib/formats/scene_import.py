@@ -11,11 +11,13 @@ import numpy as np
 
 from lib.formats import geometry_file, names, scene_geometry
 from lib.formats.scene import Scene
+from lib.nurbs.coincident import coincident
 from lib.refusal import refusal
 
 GEOMETRY_KEYS = (
     "name", "rectangle", "quadrangle", "triangle", "nurbs", "file", "units", "place", "only", "trimmed", "flip",
 )  # fmt: skip
+MOST_TOLD = 8  # pairs of surfaces a warning names
 
 
 def geometry_slice(settings, table, digests):
@@ -53,12 +55,14 @@ def assemble(placed, notes, table, up):
     emits = E.max(axis=1) > 0
     groups = sorted({row["group"] for row, lit in zip(rows, emits, strict=True) if lit}) or [rows[0]["group"]]
     group = [groups.index(row["group"]) if lit else 0 for row, lit in zip(rows, emits, strict=True)]
+    flip = np.array([one.flip ^ row["turn"] for one, row in zip(placed, rows, strict=True)], dtype=bool)
     warnings = list(notes) + ([] if emits.any() else ["no surface emits light: every map will be black"])
+    warnings += _coincident(placed, flip)
     return Scene(
         names=[one.name for one in placed],
         files=names.numbered_stems([one.name for one in placed]),
         surfaces=[one.surface for one in placed],
-        flip=np.array([one.flip ^ row["turn"] for one, row in zip(placed, rows, strict=True)], dtype=bool),
+        flip=flip,
         role=[row["role"] for row in rows],
         E=E,
         group=np.array(group, dtype=np.int32),
@@ -72,3 +76,16 @@ def assemble(placed, notes, table, up):
         up=up,
         warnings=warnings,
     )
+
+
+def _coincident(placed, flip):
+    """Warnings about surfaces that lie in one another, the first few by name."""
+    low = np.min([one.surface.P.min(axis=(0, 1)) for one in placed], axis=0)
+    high = np.max([one.surface.P.max(axis=(0, 1)) for one in placed], axis=0)
+    pairs = coincident([one.surface for one in placed], flip, float((high - low).max()))
+    told = [
+        f"surfaces {placed[a].name} and {placed[b].name} lie in one another, lit on the same side: move one a little"
+        for a, b in pairs[:MOST_TOLD]
+    ]
+    rest = len(pairs) - len(told)
+    return told + ([f"... and {rest} more pairs of surfaces that lie in one another"] if rest else [])

@@ -83,3 +83,11 @@ def test_a_missing_slice_is_named(home, capsys):
     preflight.load(home)
     assert import_scene.main(["--scene-slice", "results/room/settings/none.json", "--out", "x.npz"]) == 1
     assert "none.json: missing" in capsys.readouterr().err
+
+
+def test_a_lamp_in_the_plane_of_a_ceiling_is_a_warning_with_both_names(home, capsys):
+    lamp = "- {name: glow, rectangle: {origin: [1, 1, 0], u: [1, 0, 0], v: [0, 1, 0]}, material: lamp}\n"
+    (home / "scene.yaml").write_text(TEXT.replace("materials:", lamp + "materials:"))
+    assert run(preflight.load(home)) == 0
+    said = "warning: surfaces floor and glow lie in one another, lit on the same side: move one a little"
+    assert said in capsys.readouterr().err
