@@ -7,6 +7,8 @@ SHELL := /bin/sh
 MAKEFLAGS += --no-print-directory
 
 CORES ?= 2
+# What check-export looks at.
+RESULTS ?= results/fruit_room
 # A Python of your choice: make PYTHON=/path/to/python3.12
 PYTHON ?=
 # What open3d's wheel expects of the system, by the names of Debian and Ubuntu.
@@ -34,6 +36,19 @@ lint: setup  ## ruff over the code; what snakemake --lint says, counted (it asks
 	@$(ACTIVATE)
 	ruff check .
 	snakemake --lint 2>&1 | sed -n 's/^ *\* \(.*\)/\1/p' | sort | uniq -c
+
+bench: setup  ## error against seconds on the two reference scenes, by whole bakes (minutes)
+	@$(ACTIVATE)
+	python benchmarks/run.py $(ARGS)
+
+check-export: bake  ## the exported files in Khronos' validator and a stock viewer (needs node, npm and Chromium)
+	@$(ACTIVATE)
+	for tool in node npm; do command -v $$tool > /dev/null || { echo "make: check-export needs $$tool" >&2; exit 1; }; done
+	cd tests/browser
+	if ! [ node_modules/.package-lock.json -nt package-lock.json ]; then npm ci --no-audit --no-fund --loglevel=error; fi
+	cd ../..
+	node tests/browser/check.js "$(RESULTS)" "$$PWD/.venv/bin/python"
+	RESULTS="$(RESULTS)" python -m pytest tests/browser/check_report.py
 
 help:  ## this list
 	@sed -n 's/^\([a-z-]*\):.*##/\1\t/p' Makefile | sort
@@ -71,7 +86,7 @@ setup:  ## only create .venv from requirements.lock and check the system's libra
 	        exit 1
 	    fi
 	    if [ -e .venv ]; then say "Remaking .venv: it is incomplete, or made for another folder or lock file."; fi
-	    say "Setting up .venv with $$("$$python" --version): 114 packages, 270 MB to download the first time."
+	    say "Setting up .venv with $$("$$python" --version): 105 packages, 240 MB to download the first time."
 	    rm -rf .venv
 	    "$$python" -m venv .venv
 	    pip() { .venv/bin/python -m pip --disable-pip-version-check --no-input "$$@"; }

@@ -24,7 +24,6 @@ OWNERS = {  # the one importer of each other library: start-up cost per job, and
     "pygltflib": ("lib/formats/gltf.py",),
     "jsonschema": ("lib/formats/scene_schema.py",),
     "yaml": ("lib/formats/strict_yaml.py",),
-    "matplotlib": ("lib/formats/plots.py",),
     "fast_simplification": ("lib/lod/",),
     "xatlas": ("lib/lod/",),
 }
