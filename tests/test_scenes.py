@@ -226,7 +226,6 @@ CLOSED = [
     ("fruit_room", "pear_in_bowl/1", 213.7e-6 * 0.97**3),
     ("fruit_room", "banana/1", 115.9e-6),
     ("fruit_room", "bowl/1", 539.5e-6),
-    ("fruit_room", "globe/1", 4 / 3 * np.pi * 0.11**3),
     ("fruit_room", "duck/1", 10.6273 * 0.0407**3),
     ("monet_room", "head_right/10", 612.256e-9 * 20**3),
     ("monet_room", "head_left/06", 617.607e-9 * 20**3),
@@ -241,16 +240,16 @@ def test_closed_objects_are_closed_and_face_outwards(name, pattern, expected):
     assert volume([(s, flip)]) == pytest.approx(expected, rel=2e-3)
 
 
-def test_sphere_is_exact():
-    s = surface("fruit_room", "globe/1")
-    centre = (points(s).max(axis=0) + points(s).min(axis=0)) / 2
-    assert np.abs(np.linalg.norm(points(s) - centre, axis=1) - 0.11).max() < 1e-12
-    assert volume([(s, False)]) == pytest.approx(4 / 3 * np.pi * 0.11**3, rel=1e-7)
-    assert area(s) == pytest.approx(4 * np.pi * 0.11**2, rel=1e-6)
+def test_lamp_is_closed_by_its_lens():
+    (shade, _), (lens, _) = parts = surfaces("fruit_room", "shade/1") + surfaces("fruit_room", "lens/1")
+    assert np.array_equal(shade.P[:, 0], lens.P[:, -1])  # one rim
+    assert volume(parts) == pytest.approx(2.648e-3, rel=1e-3)
+    S, N = frame(lens, np.linspace(0, 1, 9), np.full(9, 0.5))
+    assert (N[:, 2] < -0.9).all()  # shines down
 
 
 def test_own_surfaces_have_exact_seams_and_poles():
-    for pattern in ("(apple|pear)/.", "banana/1", "bowl/1", "globe/1"):
+    for pattern in ("(apple|pear)/.", "banana/1", "bowl/1"):
         for s, _ in surfaces("fruit_room", pattern):
             assert np.array_equal(s.Pw[0], s.Pw[-1])
             assert np.ptp(s.P[:, [0, -1]], axis=0).max() < 1e-15
@@ -327,9 +326,9 @@ def test_table_legs_and_lamps_meet_what_holds_them():
     for leg, _ in surfaces("fruit_room", r"leg\.\d/1"):
         z = points(leg, 9)[:, 2]
         assert z.min() == 0 and z.max() == pytest.approx(0.705, abs=1e-12)
-    cord, globe = points(surface("fruit_room", "cord/1"), 9)[:, 2], points(surface("fruit_room", "globe/1"))[:, 2]
+    cord, shade = points(surface("fruit_room", "cord/1"), 9)[:, 2], points(surface("fruit_room", "shade/1"))[:, 2]
     assert cord.max() == pytest.approx(2.8, abs=1e-12)
-    assert cord.min() == pytest.approx(globe.max(), abs=1e-12)
+    assert shade.max() - cord.min() == pytest.approx(0.001, abs=1e-9)
     for name, patterns, height in (("fruit_room", "panel_.*", 2.8), ("monet_room", "lamp_.*_.*", 3.2)):
         for s, _ in surfaces(name, patterns):
             assert points(s, 2)[:, 2].max() == pytest.approx(height, abs=1e-12)
@@ -416,6 +415,6 @@ def test_make_fruit_writes_the_same_bytes(tmp_path):
             shutil.copy(path, tmp_path)
     runpy.run_path(str(tmp_path / "make_fruit.py"), run_name="__main__")
     written = sorted(tmp_path.glob("*.json"))
-    assert len(written) == 8
+    assert len(written) == 9
     for path in written:
         assert path.read_bytes() == (SCENES / "fruit_room" / path.name).read_bytes(), path.name

@@ -39,6 +39,8 @@ BOWL = [
     (0, 4), (30, 3.6), (41, 2.4), (46, 0), (51, 2), (53, 6), (68, 12), (100, 31), (122, 58), (130, 78),
     (129.5, 82), (126, 82.5), (122.5, 77), (113, 57), (92, 34), (62, 16), (30, 9.5), (0, 8.5),
 ]
+SHADE = [(120, 26), (114, 36), (98, 52), (74, 74), (52, 100), (40, 124), (28, 140), (12, 147), (0, 148)]
+LENS = [(0, 0), (32, 2), (64, 7.5), (94, 16), (120, 26)]
 # (degrees along the arc, radius of the section [mm])
 BANANA = [
     (-58, 0), (-58, 3.6), (-56, 4.4), (-52, 4.6), (-47, 6), (-40, 12.5), (-28, 16.5), (-12, 17.2), (6, 17.2),
@@ -48,10 +50,10 @@ BANANA = [
 
 
 def cubic_through(points):
-    """A clamped cubic B-spline through points (m, d), level at both ends: knots (m + 6,), control points (m + 2, d).
+    """A clamped cubic B-spline through points (m, d): knots (m + 6,), control points (m + 2, d).
 
-    Chord-length parameters, the interior knots at the parameters; the first and last control leg keep the height
-    (last coordinate) of the end they leave, so that a surface of revolution is smooth at its poles.
+    Chord-length parameters, the interior knots at the parameters.  An end on the axis (first coordinate 0) leaves it
+    level, so that a surface of revolution is smooth at its pole; any other end points along its chord.
     """
     points = np.asarray(points, dtype=float)
     m = len(points)
@@ -61,10 +63,12 @@ def cubic_through(points):
     A, right = np.zeros((m + 2, m + 2)), np.zeros((m + 2, points.shape[1]))
     for row, value in enumerate(t):
         A[row], right[row] = [bspline(knots, 3, k, value) for k in range(m + 2)], points[row]
-    # end slopes: along the first axis alone, as fast as the chord
-    for row, (ends, sign) in enumerate((((0, 1), 1), ((m, m + 1), -1))):
-        A[m + row, list(ends)] = -1, 1
-        right[m + row, 0] = sign * chord.sum() * (t[1] if row == 0 else 1 - t[-2]) / 3
+    for row, (first, last) in enumerate(((0, 1), (-2, -1))):
+        leg = points[last] - points[first]
+        if points[(0, -1)[row], 0] == 0:
+            leg = np.linalg.norm(leg) * np.array([np.sign(leg[0]), 0])
+        A[m + row, [first, last]] = -1, 1
+        right[m + row] = leg / 3
     return knots, np.linalg.solve(A, right)
 
 
@@ -83,12 +87,11 @@ def bspline(knots, degree, k, t):
 
 
 def revolve(profile, stand=True):
-    """The closed surface of revolution of a profile [mm] whose ends lie on the axis: u round, v along the profile."""
+    """The surface of revolution of a profile [mm]: u round, v along the profile; lowered to z = 0 if it is to stand."""
     knots, rz = cubic_through(np.asarray(profile) / 1000)
     if stand:
         rz[:, 1] -= lowest(knots, rz[:, 1])
     rz = np.round(rz, DIGITS)
-    rz[[0, -1], 0] = 0.0
     points = np.empty((9, len(rz), 3))
     points[:, :, :2] = CIRCLE[:, None, :] * rz[None, :, :1]
     points[:, :, 2] = rz[:, 1]
@@ -108,16 +111,6 @@ def lowest(knots, z):
         x, y = a + (b - a) / 3, b - (b - a) / 3
         a, b = (a, y) if value(x) < value(y) else (x, b)
     return value((a + b) / 2)
-
-
-def sphere(radius):
-    """The exact sphere about the origin: u round, v a half circle of two rational quadratics from below."""
-    r, z = radius * np.array([0, 1, 1, 1, 0.0]), radius * np.array([-1, -1, 0, 1, 1.0])
-    weights = np.array([1, HALF, 1, HALF, 1])
-    points = np.empty((9, 5, 3))
-    points[:, :, :2] = CIRCLE[:, None, :] * r[None, :, None]
-    points[:, :, 2] = z
-    return surface(2, 2, CIRCLE_KNOTS, [0, 0, 0, 0.5, 0.5, 1, 1, 1], points, CIRCLE_WEIGHTS[:, None] * weights)
 
 
 def rod(radius, length):
@@ -250,8 +243,9 @@ def main():
     write("pear.json", revolve(PEAR), stem(97, 22, -7, 1.5))
     write("banana.json", banana())
     write("bowl.json", revolve(BOWL))
-    write("globe.json", sphere(0.11))
-    write("cord.json", rod(0.004, 1.14))
+    write("shade.json", revolve(SHADE, stand=False))
+    write("lens.json", revolve(LENS, stand=False))
+    write("cord.json", rod(0.004, 1.025))
     write("table_leg.json", rod(0.03, 0.705))
     write("duck.json", *duck())
 
