@@ -4,8 +4,9 @@ Which of the two a ray meets is then a matter of rounding.  Lit sides that face 
 their backs (a wall of two sheets) are no such case.
 """
 
+from itertools import combinations
+
 import numpy as np
-from scipy.spatial import cKDTree
 
 SAME = 1e-6  # of the scene's size: float32 rays can not tell
 LEAST = 1e-6  # share of the smaller surface that must be covered
@@ -30,10 +31,10 @@ def _equal(surfaces, flip, size):
         kinds.setdefault((s.Pw.shape, s.degree_u, s.degree_v, bool(flip[k])), []).append(k)
     for members in kinds.values():
         middle = np.array([surfaces[k].P.mean(axis=(0, 1)) for k in members])
-        for a, b in cKDTree(middle / size).query_pairs(SAME):
-            a, b = sorted((members[a], members[b]))
-            if np.abs(surfaces[a].P - surfaces[b].P).max() <= SAME * size:
-                yield a, b
+        for group in _groups((middle - middle[0]) / size, SAME):
+            for a, b in combinations([members[k] for k in group], 2):
+                if np.abs(surfaces[a].P - surfaces[b].P).max() <= SAME * size:
+                    yield a, b
 
 
 def _overlapping(surfaces, flip, size, flat):
@@ -48,16 +49,35 @@ def _overlapping(surfaces, flip, size, flat):
     d = np.einsum("kc,kc->k", N, C.mean(axis=1))
     planar = (np.abs(np.einsum("kpc,kc->kp", C, N) - d[:, None]).max(axis=1) <= SAME) & (area > 0)
     index = np.flatnonzero(planar)
-    if index.size < 2:
-        return
-    plane = np.concatenate([N[index], d[index, None]], axis=1)
-    near = index[cKDTree(plane).query_pairs(2 * SAME, output_type="ndarray").reshape(-1, 2)]
-    low, high = C.min(axis=1) - SAME, C.max(axis=1) + SAME
-    a, b = near.T
-    near = near[((low[a] <= high[b]) & (low[b] <= high[a])).all(axis=1)]
-    for a, b in near:
-        if _overlap(C[a], C[b], N[a]) > LEAST * min(area[a], area[b]):
-            yield tuple(sorted((int(flat[a]), int(flat[b]))))
+    for group in _groups(np.concatenate([N, d[:, None]], axis=1)[index], 2 * SAME):
+        for a, b in _boxes_that_meet(C.min(axis=1), C.max(axis=1), index[group]):
+            if _overlap(C[a], C[b], N[a]) > LEAST * min(area[a], area[b]):
+                yield tuple(sorted((int(flat[a]), int(flat[b]))))
+
+
+def _groups(x, r):
+    """Groups (index arrays, at least two members) of points (n, k) linked by steps <= r in every coordinate."""
+    label = np.zeros(len(x), dtype=int)
+    for column in x.T:
+        order = np.lexsort((column, label))
+        new = (np.diff(label[order]) != 0) | (np.diff(column[order]) > r)
+        label[order] = np.concatenate([[0], np.cumsum(new)])
+    order = np.argsort(label, kind="stable")
+    return [group for group in np.split(order, np.flatnonzero(np.diff(label[order])) + 1) if len(group) > 1]
+
+
+def _boxes_that_meet(low, high, group):
+    """Pairs of a group whose flat boxes low..high (n, 3) share more than an edge: a sweep along its longest side."""
+    low, high = low[group], high[group]
+    axis = int(np.argmax(high.max(axis=0) - low.min(axis=0)))
+    order = np.argsort(low[:, axis], kind="stable")
+    low, high, group = low[order], high[order], group[order]
+    end = np.searchsorted(low[:, axis], high[:, axis], side="right")
+    for a in range(len(group)):
+        b = np.arange(a + 1, end[a])
+        shared = np.minimum(high[a], high[b]) - np.maximum(low[a], low[b])
+        meets = (shared >= -SAME).all(axis=1) & ((shared > SAME).sum(axis=1) >= 2)
+        yield from ((group[a], group[k]) for k in b[meets])
 
 
 def _overlap(A, B, N):

@@ -58,3 +58,8 @@ def test_a_curved_surface_twice():
     assert found(bezier(net), square(0, 0, 0), bezier(net)) == [(0, 2)]
     assert found(bezier(net), bezier(net), flip=[False, True]) == []
     assert found(bezier(net), bezier(net + 0.01)) == []
+
+
+def test_a_floor_of_many_tiles_takes_no_time():
+    tiles = [square(i, j, 0) for i in range(40) for j in range(40)]
+    assert found(*tiles, square(3.2, 3.2, 0, 0.5), size=40.0) == [(123, 1600)]
