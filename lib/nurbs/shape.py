@@ -9,6 +9,7 @@ SAME = 1e-9  # points closer than this share of the surface's size are one point
 PLANAR = 1e-7  # a surface within this share of its size of a plane is planar: float32 rays can not tell
 SIDE_SAMPLES = np.linspace(0.0, 1.0, 17)
 GAUSS_CELLS, GAUSS_ORDER = 16, 4  # composite Gauss-Legendre between knots: 1e-9 on spheres
+GAUSS = np.polynomial.legendre.leggauss(GAUSS_ORDER)
 
 
 def size(surface):
@@ -18,40 +19,42 @@ def size(surface):
 
 
 def sides(surface):
-    """Points along the sides u=0, u=1, v=0, v=1: (4, 17, 3)."""
+    """Points along the sides u=0, u=1 (2, k, 3) and v=0, v=1 (2, m, 3), some in every span between knots."""
     ends = np.array([0.0, 1.0])
-    along_v = evaluate_grid(surface, ends, SIDE_SAMPLES)[0]
-    along_u = evaluate_grid(surface, SIDE_SAMPLES, ends)[0]
-    return np.stack([along_v[:, 0], along_v[:, 1], along_u[0], along_u[1]])
+    along_v = evaluate_grid(surface, ends, _samples(surface.knots_v))[0]
+    along_u = evaluate_grid(surface, _samples(surface.knots_u), ends)[0]
+    return np.moveaxis(along_v, 1, 0), along_u
+
+
+def _samples(knots):
+    spans = np.unique(np.clip(knots, 0.0, 1.0))
+    return np.union1d(SIDE_SAMPLES, np.concatenate([spans, (spans[:-1] + spans[1:]) / 2]))
 
 
 def is_closed(surface):
     """(closed in u, closed in v): opposite sides are the same curve, and not one point."""
-    S, same = sides(surface), SAME * size(surface)
-    collapsed = collapsed_sides(surface)
-    return (
-        bool(np.abs(S[0] - S[1]).max() <= same and not collapsed[0]),
-        bool(np.abs(S[2] - S[3]).max() <= same and not collapsed[2]),
-    )
+    same, collapsed = SAME * size(surface), collapsed_sides(surface)
+    u, v = (bool(np.abs(first - last).max() <= same) for first, last in sides(surface))
+    return u and not collapsed[0], v and not collapsed[2]
 
 
 def collapsed_sides(surface):
     """(4,) bool: sides u=0, u=1, v=0, v=1 that are one point (poles)."""
-    S = sides(surface)
-    return np.abs(S - S[:, :1]).max(axis=(1, 2)) <= SAME * size(surface)
+    spread = [np.abs(S - S[:, :1]).max(axis=(1, 2)) for S in sides(surface)]
+    return np.concatenate(spread) <= SAME * size(surface)
 
 
 def is_planar(surface):
-    """True when every point lies in one plane, to float32 precision."""
-    S = evaluate_grid(surface, SIDE_SAMPLES, SIDE_SAMPLES)[0].reshape(-1, 3)
-    centred = S - S.mean(axis=0)
+    """True when every point lies in one plane, to float32 precision: when the control points do, whose hull holds the surface."""
+    P = surface.P.reshape(-1, 3)
+    centred = P - P.mean(axis=0)
     plane = np.linalg.svd(centred, full_matrices=False)[2][2]
-    return bool(np.abs(centred @ plane).max() <= PLANAR * np.ptp(S, axis=0).max())
+    return bool(np.abs(centred @ plane).max() <= PLANAR * size(surface))
 
 
 def _gauss(knots):
     """Nodes and weights over [0, 1]: no cell crosses a knot, where derivatives jump."""
-    x, weight = np.polynomial.legendre.leggauss(GAUSS_ORDER)
+    x, weight = GAUSS
     spans = np.unique(np.concatenate([[0.0, 1.0], knots[(knots > 0) & (knots < 1)]]))
     parts = np.ceil(np.diff(spans) * GAUSS_CELLS).astype(int)
     lines = [a + (b - a) * np.arange(n) / n for a, b, n in zip(spans[:-1], spans[1:], parts, strict=True)]

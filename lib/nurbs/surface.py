@@ -4,6 +4,7 @@ Source: Piegl, Tiller, The NURBS Book, chapters 2 and 4.
 """
 
 from dataclasses import dataclass
+from numbers import Integral
 
 import numpy as np
 
@@ -29,7 +30,7 @@ class NurbsSurface:
 
     def __post_init__(self):
         Pw = np.asarray(self.Pw, dtype=np.float64)
-        if Pw.ndim != 3 or Pw.shape[2] != 4:
+        if Pw.ndim != 3 or Pw.shape[2] != 4 or not Pw.size:
             raise ValueError(f"points: shape {Pw.shape}, expected (n_u, n_v, 4) homogeneous")
         if not np.isfinite(Pw).all() or np.abs(Pw).max(initial=0.0) > 1e100:
             raise ValueError("points: NaN, Inf or a coordinate beyond 1e100")
@@ -52,7 +53,7 @@ class NurbsSurface:
 
 
 def _unit_domain(knots, degree, n, direction):
-    if isinstance(degree, bool) or degree != int(degree) or degree < 1:
+    if isinstance(degree, bool) or not isinstance(degree, Integral) or degree < 1:
         raise ValueError(f"degree_{direction}: {degree!r}, expected an integer >= 1")
     if degree >= n:
         raise ValueError(f"degree_{direction}: {degree} needs at least {degree + 1} control points, found {n}")
