@@ -2,8 +2,11 @@
 
 A level needs one number, the tolerance; how many triangles it will cost is known from the plan (lib.nurbs.lines)
 without cutting anything, so a count is met by bisection over the tolerance of all surfaces together: triangles go
-where the largest distances are.  Thinning a finer mesh instead (fast_simplification) was tried and left out: it knows
-positions only, so it loses the parameters that are the texture coordinates, the seams and the agreement of neighbours.
+where the largest distances are.
+
+Thinning a finer mesh by quadrics instead (fast_simplification, positions only: it gives up the parameters, seams and
+borders) was measured on the teapot, a sphere and a head: at 30 % to 1 % of the triangles its largest distance is 1.5 to
+5 times that of a level cut here, the root mean square 0.7 to 4.6 times.
 """
 
 from dataclasses import dataclass

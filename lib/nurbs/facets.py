@@ -15,6 +15,7 @@ import numpy as np
 from lib.nurbs.evaluate import evaluate_grid
 
 STEPS = 4  # samples per cell and direction; quarters, because the middle of a coarse wave may lie on its chord
+FEW = 100  # cells; a surface cut into more is smooth inside them, and edge and facet middles show the distance
 FLAT = 1e-12  # a triangle of less area than this share of its longest edge squared has none
 
 
@@ -45,11 +46,12 @@ def _finer(lines, steps):
     return np.append((lines[:-1, None] + np.diff(lines)[:, None] * t).ravel(), lines[-1])
 
 
-def triangulate(surface, u, v, is_closed, is_collapsed, steps=STEPS):
+def triangulate(surface, u, v, is_closed, is_collapsed):
     """Cut a surface along its lines u, v (ascending, 0 and 1 among them).
 
-    is_closed (2,), is_collapsed (4,) as lib.nurbs.shape says; steps: samples per cell and direction, even.
+    is_closed (2,), is_collapsed (4,) as lib.nurbs.shape says.
     """
+    steps = STEPS if (len(u) - 1) * (len(v) - 1) <= FEW else 2
     fine = evaluate_grid(surface, _finer(u, steps), _finer(v, steps))[0]
     S = fine[::steps, ::steps]
     cells = _cells(fine, steps)

@@ -13,12 +13,11 @@ from lib.nurbs import borders as find_borders
 from lib.nurbs import lines as find_lines
 from lib.nurbs import shape
 from lib.nurbs.evaluate import evaluate_grid
-from lib.nurbs.facets import STEPS, has_area, triangulate
+from lib.nurbs.facets import has_area, triangulate
 
 NINE = np.linspace(0.0, 1.0, 9)
 SLIDE = 0.01  # share of its size by which a texture may slide on a surface
 ROUNDS = 8  # of measuring and cutting finer
-MANY = 400  # a surface of so many cells is smooth inside them: edge and facet middles show the distance
 
 
 @dataclass(frozen=True)
@@ -127,8 +126,7 @@ def cut_within(surfaces, known, p, tolerance, slide):
         placed = find_lines.place(p, both, find_lines.steps(p, both))
         for s, (u, v) in enumerate(placed):
             if before is None or not (np.array_equal(u, before[s][0]) and np.array_equal(v, before[s][1])):
-                steps = STEPS if len(u) * len(v) <= MANY else 2
-                patches[s] = triangulate(surfaces[s], u, v, known.is_closed[s], known.is_collapsed[s], steps)
+                patches[s] = triangulate(surfaces[s], u, v, known.is_closed[s], known.is_collapsed[s])
         before = placed
         distance = np.array([p.distance for p in patches])
         over = (distance > tolerance) & ~(known.is_planar & (distance <= 1e-7))
