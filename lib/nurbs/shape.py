@@ -1,4 +1,4 @@
-"""What a surface is as a shape: closed, collapsed, planar, its area and extent; independent of knots and weights' scale."""
+"""What a surface is as a shape: closed, collapsed, planar, its area and extent, whatever its knots and weights."""
 
 import numpy as np
 
@@ -45,7 +45,10 @@ def collapsed_sides(surface):
 
 
 def is_planar(surface):
-    """True when every point lies in one plane, to float32 precision: when the control points do, whose hull holds the surface."""
+    """True when every point lies in one plane, to float32 precision.
+
+    The control points tell: they lie in the plane of their surface, and it lies in their hull.
+    """
     P = surface.P.reshape(-1, 3)
     centred = P - P.mean(axis=0)
     plane = np.linalg.svd(centred, full_matrices=False)[2][2]

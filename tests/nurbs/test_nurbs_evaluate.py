@@ -99,7 +99,9 @@ def test_agrees_with_geomdl(seed):
     shape = model.to_geomdl(surface)
     u, v = np.append(U[:12], [0, 1, 0, 1]), np.append(V[:12], [0, 0, 1, 1])
     S, S_u, S_v = evaluate(surface, u, v)
-    oracle = np.array([np.array(shape.derivatives(a, b, order=1))[[0, 1, 0], [0, 0, 1]] for a, b in zip(u, v, strict=True)])
+    oracle = np.array(
+        [np.array(shape.derivatives(a, b, order=1))[[0, 1, 0], [0, 0, 1]] for a, b in zip(u, v, strict=True)]
+    )
     size = np.abs(oracle).max(axis=(0, 2))
     assert np.abs(S - oracle[:, 0]).max() < EXACT * size[0]
     assert np.abs(S_u - oracle[:, 1]).max() < 10 * EXACT * size[1]
@@ -123,7 +125,12 @@ def test_knots_and_weights_do_not_move_the_points(seed):
     expected = point(surface, U, V)
     finer = model.with_knots(surface, u=[0.123, 0.77], v=[0.456])
     heavier = from_points(
-        surface.degree_u, surface.degree_v, 1000 * surface.knots_u - 3, 1e-6 * surface.knots_v, surface.P, 7.3e5 * surface.w
+        surface.degree_u,
+        surface.degree_v,
+        1000 * surface.knots_u - 3,
+        1e-6 * surface.knots_v,
+        surface.P,
+        7.3e5 * surface.w,
     )
     for other in (finer, heavier):
         assert np.abs(point(other, U, V) - expected).max() < EXACT
@@ -219,7 +226,9 @@ def test_a_curve_has_no_normal():
 def test_thin_and_distant_surfaces_have_normals():
     thin = bilinear([0, 0, 0], [1, 0, 0], [1, 1e-6, 0], [0, 1e-6, 0])
     assert np.abs(normal(thin, U, V) - [0, 0, 1]).max() < LIMIT
-    far = NurbsSurface(1, 1, [0, 0, 1, 1], [0, 0, 1, 1], bilinear([0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]).Pw + [1e5, 1e5, 1e5, 0])
+    far = NurbsSurface(
+        1, 1, [0, 0, 1, 1], [0, 0, 1, 1], bilinear([0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]).Pw + [1e5, 1e5, 1e5, 0]
+    )
     assert np.abs(normal(far, U, V) - [0, 0, 1]).max() < LIMIT
 
 

@@ -6,10 +6,24 @@ import pytest
 from lib.nurbs import model, shape
 from lib.nurbs.evaluate import normal, point
 from lib.nurbs.surface import bilinear, from_points
-from tests.shapes import CIRCLE, CIRCLE_KNOTS, CIRCLE_WEIGHTS, box, cylinder, disc, extruded, rectangle, revolved, sphere, triangle
+from tests.shapes import (
+    CIRCLE,
+    CIRCLE_KNOTS,
+    CIRCLE_WEIGHTS,
+    box,
+    cylinder,
+    disc,
+    extruded,
+    rectangle,
+    revolved,
+    sphere,
+    triangle,
+)
 from tests.tolerances import EXACT, QUADRATURE
 
-TILT = np.array([[0.36, 0.48, -0.8, 5], [-0.8, 0.6, 0, -7], [0.48, 0.64, 0.6, 11], [0, 0, 0, 1]])  # rows are orthonormal
+TILT = np.array(
+    [[0.36, 0.48, -0.8, 5], [-0.8, 0.6, 0, -7], [0.48, 0.64, 0.6, 11], [0, 0, 0, 1]]
+)  # rows are orthonormal
 
 
 def torus(R=2.0, r=0.5):
@@ -102,7 +116,11 @@ def test_sides_that_differ_in_one_narrow_place_are_open():
     assert shape.is_closed(from_points(1, 1, [0, 0, 1, 2, 3, 4, 4], knots, P)) == (False, False)
 
 
-FLAT = {"rectangle": rectangle([0, 0, 0], [1, 0, 0], [0, 1, 0]), "disc": disc(), "triangle": triangle([0, 0, 0], [1, 0, 0], [0, 1, 0])}
+FLAT = {
+    "rectangle": rectangle([0, 0, 0], [1, 0, 0], [0, 1, 0]),
+    "disc": disc(),
+    "triangle": triangle([0, 0, 0], [1, 0, 0], [0, 1, 0]),
+}
 BENT = {
     "sphere": sphere(),
     "cylinder": cylinder(),

@@ -42,7 +42,10 @@ BAD = {
     "NaN for a degree": ({"degree_v": float("nan")}, "degree_v: nan, expected an integer >= 1"),
     "Inf for a degree": ({"degree_v": float("inf")}, "degree_v: inf, expected an integer >= 1"),
     "text for a degree": ({"degree_v": "2"}, "degree_v: '2', expected an integer >= 1"),
-    "degree too high": ({"degree_u": 4, "knots_u": [0] * 4 + [1] * 5}, "degree_u: 4 needs at least 5 control points, found 4"),
+    "degree too high": (
+        {"degree_u": 4, "knots_u": [0] * 4 + [1] * 5},
+        "degree_u: 4 needs at least 5 control points, found 4",
+    ),
     "too few knots": ({"knots_u": [0, 0, 0, 1, 1, 1]}, r"knots_u: 6 knots, expected 4 \+ 2 \+ 1 = 7"),
     "too many knots": ({"knots_v": [0, 0, 0.5, 1, 1]}, r"knots_v: 5 knots, expected 2 \+ 1 \+ 1 = 4"),
     "knots that go back": ({"knots_u": [0, 0, 0, 2, 1, 2, 2]}, "knots_u: knot 4 goes back"),
@@ -79,7 +82,16 @@ def test_domain_is_the_unit_square():
 def test_creases_up_to_the_degree_are_allowed():
     assert from_points(**(GOOD | {"degree_u": 1, "knots_u": [0, 0, 1, 2, 3, 3]})).degree_u == 1
     five = np.concatenate([GOOD["P"], GOOD["P"][-1:] + [1, 0, 0]])
-    assert from_points(2, 1, [0, 0, 0, 1, 1, 2, 2, 2], [0, 0, 1, 1], five).knots_u.tolist() == [0, 0, 0, 0.5, 0.5, 1, 1, 1]
+    assert from_points(2, 1, [0, 0, 0, 1, 1, 2, 2, 2], [0, 0, 1, 1], five).knots_u.tolist() == [
+        0,
+        0,
+        0,
+        0.5,
+        0.5,
+        1,
+        1,
+        1,
+    ]
 
 
 def test_a_common_factor_of_the_weights_changes_nothing():
