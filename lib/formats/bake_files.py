@@ -83,7 +83,10 @@ def load(files):
 
 
 def _is_current(path, n_chunks, n_levels):
-    """Is a cost file of a job that this bake has? Fewer chunks or levels leave those of an earlier one behind."""
+    """Is a cost file of a job that this bake has? Fewer chunks or levels leave those of an earlier one behind, and a
+    report's own is that of the report before."""
+    if Path(path).parent.name == "report":
+        return False
     numbered = re.fullmatch(r"cost_(?:direct_|indirect_)?(\d+)", Path(path).stem)
     if numbered is None:
         return True

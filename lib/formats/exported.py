@@ -26,12 +26,15 @@ COUNT = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 WRAP = {33071: "clamp", 10497: "repeat", 33648: "mirror"}
 
 
-def load(path):
-    """(list of Part, list of Texture) of a .gltf or .glb file. Raises ArtefactError naming the file and the fault."""
-    path = Path(path)
+def load(path, known=None):
+    """(list of Part, list of Texture) of a .gltf or .glb file. Raises ArtefactError naming the file and the fault.
+
+    known : {picture file: linear rgb} of files read before, added to; levels that name the same pictures read them once
+    """
+    path, known = Path(path), {} if known is None else known
     try:
         document, buffers = _open(path)
-        textures = [_texture(document, buffers, path, t) for t in document.get("textures", [])]
+        textures = [_texture(document, buffers, path, t, known) for t in document.get("textures", [])]
         scene = document["scenes"][document.get("scene", 0)]
         parts = []
         for node in scene["nodes"]:
@@ -157,12 +160,15 @@ def _transformed(st, how):
     return (st * how.get("scale", (1, 1))) @ turn.T + how.get("offset", (0, 0))
 
 
-def _texture(document, buffers, path, texture):
+def _texture(document, buffers, path, texture, known):
     image = document["images"][texture["source"]]
     sampler = document["samplers"][texture["sampler"]] if "sampler" in texture else {}
     wrap = tuple(WRAP[sampler.get(key, 10497)] for key in ("wrapS", "wrapT"))
     if "uri" in image and not image["uri"].startswith("data:"):
-        rgb = pictures.read_linear(path.parent / unquote(image["uri"]))
+        file = path.parent / unquote(image["uri"])
+        if file not in known:
+            known[file] = pictures.read_linear(file)
+        rgb = known[file]
     else:
         data = _bytes(path, image["uri"]) if "uri" in image else _view(document, buffers, image["bufferView"])[0]
         handle, name = tempfile.mkstemp(suffix=".jpg" if data[:2] == b"\xff\xd8" else ".png")

@@ -1,6 +1,7 @@
 """The pictures of the report: the exported levels, drawn; the maps, small; and what the viewer needs."""
 
 import tempfile
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,34 +17,32 @@ MOST_THUMBNAILS = 160
 
 
 def draw(bake, facts, settings):
-    """Pictures of the levels and maps, and what the viewer shows."""
-    view, near, levels, hero, documents, textures = None, None, [], None, [], {}
-    given = settings.get("camera")
-    for level in facts["levels"]:
-        path = bake.folder / level["file"]
-        parts, loaded = exported.load(path)
-        model = picture.join(parts)
-        if view is None:
-            view = scene_camera(given, settings) if given else cameras.automatic(model)
-            near = cameras.closer(model, view, *SMALL)
-            hero = png(picture.render(model, loaded, view, *HERO))
-        levels.append(tuple(png(shot) for shot in picture.render_with_edges(model, loaded, near, *SMALL)))
-        inlined = exported.inlined(path)
-        if inlined and documents is not None:
-            documents.append(inlined[0])
-            textures.update(inlined[1])
-        else:
-            documents = None
-    shown = (
-        {
-            "levels": documents,
-            "textures": textures,
-            "camera": {"eye": list(view.eye), "target": list(view.target), "fov": view.fov},
-        }
-        if documents
-        else None
-    )
-    return Pictures(hero, levels, map_thumbnails(bake, facts)), shown
+    """Pictures of the levels and maps, and what the viewer shows (None where that is too large to inline)."""
+    known, inlined, levels, hero, view, near = {}, [], [], None, None, None
+    with tempfile.TemporaryDirectory() as folder:
+        png = partial(_png, Path(folder) / "x.png")
+        for level in facts["levels"]:
+            path = bake.folder / level["file"]
+            parts, textures = exported.load(path, known)
+            model = picture.join(parts)
+            if view is None:
+                given = settings.get("camera")
+                view = scene_camera(given, settings) if given else cameras.automatic(model)
+                near = cameras.closer(model, view, *SMALL)
+                hero = png(picture.render(model, textures, view, *HERO))
+            levels.append(tuple(png(shot) for shot in picture.render_with_edges(model, textures, near, *SMALL)))
+            inlined.append(exported.inlined(path))
+        drawn = Pictures(hero, levels, map_thumbnails(bake, facts, png))
+    return drawn, None if None in inlined or not inlined else _viewer_model(inlined, view)
+
+
+def _viewer_model(inlined, view):
+    """What viewer.js reads: the levels as glTF documents, each picture once, where to stand."""
+    return {
+        "levels": [document for document, _ in inlined],
+        "textures": {uri: data for _, named in inlined for uri, data in named.items()},
+        "camera": {"eye": list(view.eye), "target": list(view.target), "fov": view.fov},
+    }
 
 
 def scene_camera(given, settings):
@@ -57,8 +56,8 @@ def scene_camera(given, settings):
     return cameras.Camera(place(given["eye"]), place(given["target"]), float(given.get("fov", 50)))
 
 
-def map_thumbnails(bake, facts):
-    """{name: Thumbnail} of the largest maps of light."""
+def map_thumbnails(bake, facts, png):
+    """{name: Thumbnail} of the largest maps of light; png(codes) gives PNG bytes."""
     if bake.textures is None:
         return {}
     light = bake.textures.light
@@ -81,9 +80,7 @@ def map_thumbnails(bake, facts):
     return drawn
 
 
-def png(codes):
-    """PNG bytes of 8-bit codes (h, w, 3)."""
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "x.png"
-        pictures.write_png8(path, codes)
-        return path.read_bytes()
+def _png(path, codes):
+    """PNG bytes of 8-bit codes (h, w, 3), by way of a file: OpenImageIO's Python writes to nothing else."""
+    pictures.write_png8(path, codes)
+    return path.read_bytes()
