@@ -47,7 +47,7 @@ def body(args, cost):
         mine = world.chunk(args.chunks, args.chunk)
         table = lookup_table(world, direct, solved)
         done = refine_indirect(
-            world, mine, table, chosen["seed"], tau, chosen["top"], chosen["base_indirect"], chosen["gather_rays"]
+            world, mine, table, solved, chosen["seed"], tau, chosen["top"], chosen["base_indirect"], chosen["gather_rays"]
         )
     trees.save(args.out, args.half, {int(s): stored(t, world.n_groups) for s, t in done.items()}, cost.notes)
     cost.rays = world.tracer.rays

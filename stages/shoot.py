@@ -37,8 +37,9 @@ def body(args, cost):
     entries, share, area, H_direct = collected(chunks, grids.total, len(x.groups))
     surface = np.repeat(np.arange(len(x.names)), grids.n_u * grids.n_v)
     bounces = None if chosen["bounces"] == "converge" else int(chosen["bounces"])
+    F = FormFactors(entries)
     try:
-        found = solve(H_direct, rho[surface], area, FormFactors(entries), chosen["convergence"], bounces)
+        found = solve(H_direct, rho[surface], area, F, chosen["convergence"], bounces)
     except DoesNotConverge as error:
         raise Refusal(f"the light does not converge: {error}; lower the reflectances or set bounces to a number") from None
     watts = mesh.scale**2
@@ -55,7 +56,8 @@ def body(args, cost):
         args.out,
         solution.Solution(
             np.maximum(found.H - H_direct, 0).astype(np.float32),
-            share.astype(np.float32), grids.n_u, grids.n_v, rho, mean_H, H_surface, found.history, ledger, facts,
+            share.astype(np.float32), F.spread(found.H.sum(axis=1) * rho[surface]).astype(np.float32),
+            found.H.sum(axis=1).max(axis=1, initial=0.0).astype(np.float32), grids.n_u, grids.n_v, rho, mean_H, H_surface, found.history, ledger, facts,
         ),
     )
 

@@ -13,6 +13,7 @@ from lib.elements.balance import balance, children
 WIDE, WIDE_LEVELS = 1.0, 2  # root-cell widths; levels below the base
 
 SMALLEST_CELL = 1e-3  # of the scene's largest side: finer than anybody sees
+NOISE = 1.0  # standard errors taken off a departure before it counts
 FULL_CELL, SLACK = 1 / 16, 0.5
 
 
@@ -112,7 +113,11 @@ class Quadtree:
         across_hidden = ends_hidden[:, :-1] | ends_hidden[:, 1:]
         centre = _departure(across, across_hidden, value[1::2, 1::2], hidden[1::2, 1::2], axis=0)
         worst = np.maximum.reduce([row[:-1], row[1:], column[:, :-1], column[:, 1:], centre])
-        return np.where(self.divided[level], worst, 0.0)
+        # A departure within the samples' own noise says nothing.
+        noise = self.noise[::step, ::step]
+        doubt = np.maximum.reduce([noise[a : a + 2 * len(worst) : 2, b : b + 2 * worst.shape[1] : 2]
+                                   for a, b in ((0, 1), (2, 1), (1, 0), (1, 2), (1, 1))])
+        return np.where(self.divided[level], np.maximum(worst - NOISE * doubt, 0.0), 0.0)
 
     def _deepen(self):
         self.level += 1

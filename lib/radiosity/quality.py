@@ -2,7 +2,7 @@
 
 Model: the relative RMS error of a map is the root of the sum of squares of
 
-    gather         0.6 % (256 / K)^0.8
+    gather         0.6 % (800 / K)^0.8
     lookups        0.5 % (1600 / n_elements)^0.3
     direct light   0.5 % (64 / n1)^0.5
     interpolation  0.4 % (t / 0.025)
@@ -35,14 +35,14 @@ class Quality:
         return asdict(self)
 
 
-def quality(tolerance, max_level=6):
+def quality(tolerance, max_level=8):
     """Quality for a relative RMS error `tolerance` (0.002 .. 0.1) with trees at most `max_level` deep.
 
     The number of elements changes in steps, so that most changes of the tolerance leave the solved elements as they are.
     """
     ratio = tolerance / 0.01
     elements = 1600 if tolerance >= 0.0075 else 4000 if tolerance >= 0.004 else 10000
-    rays = _multiple_of_16(256 * ratio**-1.25, 32, 4096)
+    rays = _multiple_of_16(800 * ratio**-1.25, 32, 4096)
     n1 = 32 if tolerance >= 0.015 else 64 if tolerance >= 0.0075 else 256
     return Quality(
         n_elements=elements,

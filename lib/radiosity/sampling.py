@@ -20,9 +20,12 @@ HIDDEN_RAYS = 16  # decide for a sample without light of its own
 
 @dataclass(frozen=True)
 class Points:
-    """Samples of several surfaces in one batch: surface (n,), x, N (n, 3) lifted, shift (n, 2)."""
+    """Samples of several surfaces in one batch: surface (n,), cell (n,) side of the lattice's cells in the scene's frame,
+    uv (n, 2) in [0, 1], x, N (n, 3) lifted, shift (n, 2)."""
 
     surface: np.ndarray
+    cell: np.ndarray
+    uv: np.ndarray
     x: np.ndarray
     N: np.ndarray
     shift: np.ndarray
@@ -37,7 +40,10 @@ def points_at(world, seed, wanted, level_of):
     for s, (j, i) in wanted.items():
         x, N = receivers(world.surface(s), world.scene.flip[s], world.casters.sag[s], world.lattices[s], level_of[s], j, i)
         up = 2 ** (FINEST - level_of[s])
-        parts.append((np.full(len(j), s), x, N, shift(stream(seed, world.scene.names[s]), i * up, j * up)))
+        cell = np.full(len(j), world.side(s) * 2.0 ** -level_of[s])
+        h, w = world.lattices[s].shape(level_of[s])
+        uv = np.stack([i / (w - 1), j / (h - 1)], axis=1)
+        parts.append((np.full(len(j), s), cell, uv, x, N, shift(stream(seed, world.scene.names[s]), i * up, j * up)))
     return Points(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 

@@ -66,6 +66,11 @@ class FormFactors:
         """sum_i F_ij power_i for power (n, C): (n, C)."""
         return self._sum(self._column, self._row, power)
 
+    def spread(self, B):
+        """Standard deviation over each row's rays of the radiosity they meet, largest channel: B (n, C) -> (n,)."""
+        mean, square = self.gather(B), self.gather(B * B)
+        return np.sqrt(np.maximum(square - mean * mean, 0).max(axis=1, initial=0.0))
+
     def _sum(self, to, source, values):
         weighted = self._F[:, None] * values[source]
         return np.stack([np.bincount(to, w, minlength=self.n) for w in weighted.T], axis=1)

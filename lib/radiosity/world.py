@@ -7,6 +7,7 @@ import numpy as np
 from lib.elements.chunks import members
 from lib.elements.grids import element_grids
 from lib.elements.lattice import Lattice, roots_of
+from lib.nurbs.evaluate import frame_grid
 from lib.nurbs.shape import transformed
 from lib.radiosity.emitters import gather_emitters
 from lib.visibility.mesh_lookup import MeshLookup
@@ -14,6 +15,13 @@ from lib.visibility.tracer import Tracer
 
 FINEST = 10  # lattice positions are hashed on this level's lattice: a crossing draws the same rays at whatever level it is met
 LARGE = 0.25  # root cells from this side on, in the scene's largest side, start their trees in full
+TURN = 0.6  # radians between the normals of neighbouring base samples: more, and light that depends on direction is missed
+
+
+def _steepest(N):
+    """Least cosine between neighbouring unit normals (h, w, 3)."""
+    along = [(N[:, 1:] * N[:, :-1]).sum(axis=2), (N[1:] * N[:-1]).sum(axis=2)]
+    return min(float(cosine.min(initial=1.0)) for cosine in along)
 
 
 class World:
@@ -48,8 +56,15 @@ class World:
         return float(max(self.casters.extent[s])) / max(self.lattices[s].roots)
 
     def base_level(self, s, level):
-        """Level at which the trees of surface s begin: `level` on large surfaces, less on those with small cells anyway."""
-        return int(np.clip(level + np.round(np.log2(self.side(s) / LARGE)), 1, level))
+        """Level at which the trees of surface s begin: `level` on large surfaces, less on small ones as far as they are flat."""
+        least = int(np.clip(level + np.round(np.log2(self.side(s) / LARGE)), 1, level))
+        if self.casters.is_planar[s] or least == level:
+            return least
+        h, w = self.lattices[s].shape(level)
+        N = frame_grid(self.surface(s), np.linspace(0, 1, w), np.linspace(0, 1, h))[1]
+        while least < level and _steepest(N[:: 2 ** (level - least), :: 2 ** (level - least)]) < np.cos(TURN):
+            least += 1
+        return least
 
     @cached_property
     def emitters(self):
