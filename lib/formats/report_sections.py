@@ -282,7 +282,12 @@ def seams(figures):
         "Borders that two surfaces share smoothly, worst first: the largest difference of irradiance between their "
         "maps along the border."
     )
-    return section("Seams", table(columns, figures["seams"]), note, "seams")
+    after = "".join(
+        f"<p>In the exported textures, within the budget, the largest step is {number(r['worst'])} W/m\u00b2 "
+        f"({share(r['relative'])} of the mean light), between {escape(r['a'])} and {escape(r['b'])}.</p>"
+        for r in figures["seams_exported"][:1]
+    )
+    return section("Seams", table(columns, figures["seams"]) + after, note, "seams")
 
 
 def settings(figures):

@@ -29,6 +29,7 @@ SAVINGS = {
     "dim": ("dim lights counted as unblocked", "pairs of sample and light"),
     "agreed": ("lights whose first shadow rays agreed", "pairs of sample and light"),
     "few_texels": ("maps that ended at their root grid", "maps"),
+    "one_colour": ("maps of one even colour: no texture", "maps"),
     "levels_dropped": ("deepest levels dropped before writing, all within a quarter of the tolerance", "levels"),
 }
 
@@ -205,15 +206,25 @@ def level_rows(lods):
     return rows
 
 
+def exported_seams(bake, maps, mean_H):
+    """The same as the seams of the maps, of the exported ones: within the budget, which treats neighbours apart."""
+    if maps is None:
+        return []
+    H = seams.exported_irradiance(maps, bake.textures.rho_avg, bake.textures.textured)
+    return seams.rows(bake.scene, bake.casters, H, mean_H)
+
+
 def counted(bake, rows):
     """Savings by name, counted here or noted by the jobs."""
     noted = notes([{"notes": facts} for facts in bake.tree_facts])
     noted = {**noted, **{k: v for k, v in notes(bake.costs).items() if k in SAVINGS}}
+    pictures = bake.lods.get("textures") or {}
     return {
         **noted,
         "cast_only": sum(row["role"] == "cast_only" for row in rows),
         "receive_only": sum(row["role"] == "receive_only" for row in rows),
         "black": sum(row["is_black"] for row in rows),
+        "one_colour": sum(row["map"] is not None and row["name"] not in pictures for row in rows) if pictures else 0,
         "few_texels": sum(row["map"] is not None and row["map"] == [r + 1 for r in row["roots"]] for row in rows),
     }
 
@@ -265,6 +276,7 @@ def collect(name, bake, settings, run):
         "savings": savings(counted(bake, rows)),
         "notes": notes(bake.costs),
         "seams": seams.rows(bake.scene, bake.casters, bake.maps, mean_H),
+        "seams_exported": exported_seams(bake, exported_maps, mean_H),
         "exposure": bake.lods.get("exposure"),
         "settings": settings.get("settings"),
         "warnings": [*scene.warnings, *settings.get("warnings", [])],

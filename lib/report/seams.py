@@ -6,6 +6,7 @@ Conventions: maps [j, i] = [v row, u column]; sides 0 u=0, 1 u=1, 2 v=0, 3 v=1; 
 
 import numpy as np
 
+from lib.maps.mapset import pack
 from lib.nurbs.evaluate import normal
 
 MOST = 20  # rows listed
@@ -48,6 +49,18 @@ def border_uv(side, is_reversed=False, n=PROBES):
     t = t[::-1] if is_reversed else t
     fixed = np.full(n, float(side in (1, 3)))
     return (fixed, t) if side in (0, 1) else (t, fixed)
+
+
+def exported_irradiance(maps, rho_avg, textured):
+    """MapSet of H (N, 1, 3) = B / rho_avg of the exported maps (N, 3), without those that carry a base texture.
+
+    What a surface does not reflect at all (rho_avg = 0 in a channel) counts as no light.
+    """
+    kept = np.flatnonzero(~textured)
+    inverse = np.where(rho_avg > 0, 1 / np.where(rho_avg > 0, rho_avg, 1), 0)
+    H = [(maps.map(k) * inverse[k])[:, :, None] for k in kept]
+    hidden = [maps.hidden_map(k) for k in kept]
+    return pack(maps.surface[kept], maps.roots[kept], maps.level[kept], H, hidden, channels=(1, 3))
 
 
 def rows(scene, casters, maps, mean_H):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lib.maps.mapset import pack
 from lib.report import seams
 
 
@@ -44,3 +45,11 @@ def test_smooth_means_within_ten_degrees():
     for degrees, expected in ((9, True), (11, False)):
         a = np.radians(degrees)
         assert seams.is_smooth(up, np.array([[0, np.sin(a), np.cos(a)]] * 3)) is expected
+
+
+def test_exported_radiosity_is_divided_by_its_reflectance_and_textured_maps_are_left_out():
+    B = [np.full((2, 2, 3), 3.0), np.full((2, 2, 3), 5.0)]
+    maps = pack([4, 7], [[1, 1]] * 2, [0, 0], B)
+    H = seams.exported_irradiance(maps, np.array([[0.5, 1, 0], [1, 1, 1]]), np.array([False, True]))
+    assert H.surface.tolist() == [4]
+    assert H.map(0)[0, 0].tolist() == [[6, 3, 0]]
