@@ -45,28 +45,36 @@ class Lattice:
 
     def is_own(self, level):
         """(h, w) bool: crossings that are samples of their own, not copies across a seam or along a collapsed side."""
-        own = np.ones(self.shape(level), dtype=bool)
-        if self.closed[0]:
-            own[:, -1] = False
-        if self.closed[1]:
-            own[-1] = False
-        for side, line in zip(self.collapsed, (own[:, 0], own[:, -1], own[0], own[-1]), strict=True):
-            if side:
-                first = line[0] or line[-1]
-                line[:] = False
-                line[0] = first
+        shape = self.shape(level)
+        own = np.ones(shape, dtype=bool)
+        if self._repeats:
+            own[self._copies(shape)[0]] = False
         return own
 
     def copy_own(self, array):
-        """Copy samples to the crossings that repeat them, in place: seams first, then collapsed sides; returns array (h, w, ...)."""
-        if self.closed[0]:
-            array[:, -1] = array[:, 0]
-        if self.closed[1]:
-            array[-1] = array[0]
-        for side, line in zip(self.collapsed, (array[:, 0], array[:, -1], array[0], array[-1]), strict=True):
-            if side:
-                line[:] = line[:1].copy()
+        """Copy samples to the crossings that repeat them, in place; returns array (h, w, ...)."""
+        if self._repeats:
+            copy, source = self._copies(array.shape[:2])
+            array[copy] = array[source]
         return array
+
+    @property
+    def _repeats(self):
+        return any(self.closed) or any(self.collapsed)
+
+    def _copies(self, shape):
+        """Crossings that repeat another, and which: two (j, i).  Of all crossings at one point the first in the array counts."""
+        source = np.arange(shape[0] * shape[1]).reshape(shape)
+        sides = source[:, 0], source[:, -1], source[0], source[-1]
+        for _ in range(3):  # seams and poles that meet in corners hand the first on from side to side
+            for is_closed, (first, last) in zip(self.closed, (sides[:2], sides[2:]), strict=True):
+                if is_closed:
+                    first[:] = last[:] = np.minimum(first, last)
+            for is_collapsed, side in zip(self.collapsed, sides, strict=True):
+                if is_collapsed:
+                    side[:] = side.min()
+        copy = np.nonzero(source != np.arange(source.size).reshape(shape))
+        return copy, np.divmod(source[copy], shape[1])
 
 
 def receivers(surface, flip, lift, lattice, level, j, i):
