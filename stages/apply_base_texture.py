@@ -88,6 +88,7 @@ def body(args, cost):
 
 
 def checked_level(level):
+    """The setting texture_level, a whole number from 0 to 14; Refusal otherwise."""
     if isinstance(level, bool) or not isinstance(level, int) or not 0 <= level <= 14:
         raise Refusal(f"texture_level: {level!r}, allowed are whole numbers from 0 to 14")
     return level
