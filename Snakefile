@@ -1,17 +1,17 @@
 # From a scene folder to its bake: snakemake --cores 2 --config scene=FOLDER [SETTING=VALUE ...]
 # Rules read their slice of the settings as params, so that a changed setting re-runs the stages that read it and no others.
 import os
-import shlex
 import sys
 import uuid
 
 sys.path.insert(0, workflow.basedir)
 
+from lib.door import stopped
 from lib.formats import preflight
 from lib.formats.artefact import ArtefactError
 from lib.formats.rule_settings import n_chunks, rule_settings
 from lib.refusal import Refusal
-from lib.stage_code import stage_code
+from lib.stage_code import stage_digests
 
 from snakemake.utils import min_version
 
@@ -24,13 +24,15 @@ try:
 except (Refusal, ArtefactError) as error:
     print(error, file=sys.stderr)
     sys.exit(1)
+for warning in scene.warnings:
+    print(f"warning: {warning}", file=sys.stderr)
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # jobs are the parallelism; idle threads cost start-up
 os.environ["PYTHONPATH"] = os.pathsep.join([workflow.basedir, *filter(None, [os.environ.get("PYTHONPATH")])])
 os.environ.setdefault("BAKE_RUN", uuid.uuid4().hex)  # tells this run's costs from those of earlier ones
+os.environ["BAKE_SCENE"] = scene.file  # whose settings a job that refuses them names
 
-ROOT = workflow.basedir
-RUN = shlex.quote(sys.executable) + " -m stages."
+PYTHON = sys.executable
 OUT = f"results/{scene.name}"
 STAGE = f"{OUT}/stages"
 SETTINGS = rule_settings(scene.settings, scene.warnings)
@@ -42,8 +44,25 @@ MAPS = [f"{OUT}/maps/{file}.exr" for file in MAPPED]
 
 
 def code(stage):
-    """The stage's script and the modules of lib it reaches: an edit re-runs it."""
-    return stage_code(stage, ROOT)
+    """A param for each file of the stage's code, so that an edit re-runs it and the reason names the file.
+
+    Params and not inputs: an edit during the run is noticed by the next, old time stamps and a moved checkout do not
+    matter, and the terminal is spared a hundred paths a job.
+    """
+    return stage_digests(stage, workflow.basedir)
+
+
+def watched(files):
+    """The user's files as inputs: relative below the working folder, so that it can be moved.
+
+    Snakemake would take a {name} in a path for a wildcard. The slices hold the digests of all files, these too.
+    """
+    here = os.getcwd() + os.sep
+    return [path.removeprefix(here) for path in files if "{" not in path]
+
+
+onerror:
+    print(*stopped(STAGE, os.environ["BAKE_RUN"]), sep="\n", file=sys.stderr)  # again, below what Snakemake had to say
 
 
 rule all:
@@ -57,32 +76,32 @@ rule all:
 
 rule import_scene:
     input:
-        geometry=scene.geometry_files,
-        code=code("import_scene"),
+        geometry=watched(scene.geometry_files),
     output:
         f"{STAGE}/import_scene/scene.npz",
     params:
+        *code("import_scene"),
         slice=scene.slices["geometry"],
     log:
         text=f"{STAGE}/import_scene/log.txt",
         cost=f"{STAGE}/import_scene/cost.json",
     shell:
-        RUN + "import_scene --scene-slice {params.slice:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
+        "{PYTHON:q} -m stages.import_scene --scene-slice {params.slice:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
 
 rule tessellate:
     input:
         scene=rules.import_scene.output,
-        code=code("tessellate"),
     output:
         f"{STAGE}/tessellate/casters.npz",
     params:
+        *code("tessellate"),
         settings=SETTINGS["tessellate"],
     log:
         text=f"{STAGE}/tessellate/log.txt",
         cost=f"{STAGE}/tessellate/cost.json",
     shell:
-        RUN + "tessellate --scene {input.scene:q} --settings {params.settings:q} --out {output:q}"
+        "{PYTHON:q} -m stages.tessellate --scene {input.scene:q} --settings {params.settings:q} --out {output:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
 
@@ -90,17 +109,17 @@ rule sample:
     input:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
-        code=code("sample"),
     output:
         f"{STAGE}/sample/chunk_{{c}}.npz",
     params:
+        *code("sample"),
         settings=SETTINGS["sample"],
         chunks=N_CHUNKS,
     log:
         text=f"{STAGE}/sample/log_{{c}}.txt",
         cost=f"{STAGE}/sample/cost_{{c}}.json",
     shell:
-        RUN + "sample --scene {input.scene:q} --casters {input.casters:q} --chunk {wildcards.c} --chunks {params.chunks}"
+        "{PYTHON:q} -m stages.sample --scene {input.scene:q} --casters {input.casters:q} --chunk {wildcards.c} --chunks {params.chunks}"
         " --settings {params.settings:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
 
@@ -109,17 +128,17 @@ rule shoot:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
         samples=expand(rules.sample.output, c=CHUNKS),
-        code=code("shoot"),
     output:
         f"{STAGE}/shoot/solution.npz",
     params:
+        *code("shoot"),
         settings=SETTINGS["shoot"],
         materials=scene.slices["materials"],
     log:
         text=f"{STAGE}/shoot/log.txt",
         cost=f"{STAGE}/shoot/cost.json",
     shell:
-        RUN + "shoot --scene {input.scene:q} --casters {input.casters:q} --samples {input.samples:q}"
+        "{PYTHON:q} -m stages.shoot --scene {input.scene:q} --casters {input.casters:q} --samples {input.samples:q}"
         " --materials {params.materials:q} --settings {params.settings:q} --out {output:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
@@ -130,17 +149,17 @@ rule refine_direct:
         casters=rules.tessellate.output,
         solution=rules.shoot.output,
         samples=rules.sample.output,
-        code=code("refine"),
     output:
         f"{STAGE}/refine/direct_{{c}}.npz",
     params:
+        *code("refine"),
         settings=SETTINGS["refine"],
         chunks=N_CHUNKS,
     log:
         text=f"{STAGE}/refine/log_direct_{{c}}.txt",
         cost=f"{STAGE}/refine/cost_direct_{{c}}.json",
     shell:
-        RUN + "refine --half direct --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
+        "{PYTHON:q} -m stages.refine --half direct --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
         " --samples {input.samples:q} --chunk {wildcards.c} --chunks {params.chunks} --settings {params.settings:q}"
         " --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
@@ -151,17 +170,17 @@ rule refine_indirect:
         casters=rules.tessellate.output,
         solution=rules.shoot.output,
         direct=expand(rules.refine_direct.output, c=CHUNKS),
-        code=code("refine"),
     output:
         f"{STAGE}/refine/indirect_{{c}}.npz",
     params:
+        *code("refine"),
         settings=SETTINGS["refine"],
         chunks=N_CHUNKS,
     log:
         text=f"{STAGE}/refine/log_indirect_{{c}}.txt",
         cost=f"{STAGE}/refine/cost_indirect_{{c}}.json",
     shell:
-        RUN + "refine --half indirect --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
+        "{PYTHON:q} -m stages.refine --half indirect --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
         " --direct {input.direct:q} --chunk {wildcards.c} --chunks {params.chunks} --settings {params.settings:q}"
         " --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
@@ -172,16 +191,16 @@ rule balance_resample:
         solution=rules.shoot.output,
         direct=rules.refine_direct.output,
         indirect=rules.refine_indirect.output,
-        code=code("balance_resample"),
     output:
         f"{STAGE}/balance_resample/chunk_{{c}}.npz",
     params:
+        *code("balance_resample"),
         settings=SETTINGS["balance_resample"],
     log:
         text=f"{STAGE}/balance_resample/log_{{c}}.txt",
         cost=f"{STAGE}/balance_resample/cost_{{c}}.json",
     shell:
-        RUN + "balance_resample --scene {input.scene:q} --solution {input.solution:q} --direct {input.direct:q}"
+        "{PYTHON:q} -m stages.balance_resample --scene {input.scene:q} --solution {input.solution:q} --direct {input.direct:q}"
         " --indirect {input.indirect:q} --settings {params.settings:q} --out {output:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
@@ -190,12 +209,12 @@ rule apply_base_texture:
     input:
         scene=rules.import_scene.output,
         maps=expand(rules.balance_resample.output, c=CHUNKS),
-        textures=scene.texture_files,
-        code=code("apply_base_texture"),
+        textures=watched(scene.texture_files),
     output:
         textured=f"{STAGE}/apply_base_texture/textured.npz",
         maps=MAPS,
     params:
+        *code("apply_base_texture"),
         settings=SETTINGS["apply_base_texture"],
         materials=scene.slices["materials"],
         slice=scene.slices["textures"],
@@ -204,7 +223,7 @@ rule apply_base_texture:
         text=f"{STAGE}/apply_base_texture/log.txt",
         cost=f"{STAGE}/apply_base_texture/cost.json",
     shell:
-        RUN + "apply_base_texture --scene {input.scene:q} --maps {input.maps:q} --materials {params.materials:q}"
+        "{PYTHON:q} -m stages.apply_base_texture --scene {input.scene:q} --maps {input.maps:q} --materials {params.materials:q}"
         " --textures {params.slice:q} --settings {params.settings:q} --maps-folder {params.folder:q}"
         " --out {output.textured:q} --log {log.text:q} --cost {log.cost:q}"
 
@@ -213,17 +232,17 @@ rule budget_reduce:
     input:
         textured=rules.apply_base_texture.output.textured,
         casters=rules.tessellate.output,
-        code=code("budget_reduce"),
     output:
         textures=f"{STAGE}/budget_reduce/textures.npz",
         table=f"{STAGE}/budget_reduce/budget.json",
     params:
+        *code("budget_reduce"),
         settings=SETTINGS["budget_reduce"],
     log:
         text=f"{STAGE}/budget_reduce/log.txt",
         cost=f"{STAGE}/budget_reduce/cost.json",
     shell:
-        RUN + "budget_reduce --maps {input.textured:q} --casters {input.casters:q} --settings {params.settings:q}"
+        "{PYTHON:q} -m stages.budget_reduce --maps {input.textured:q} --casters {input.casters:q} --settings {params.settings:q}"
         " --out {output.textures:q} --table {output.table:q} --log {log.text:q} --cost {log.cost:q}"
 
 
@@ -231,16 +250,16 @@ rule lod_export:
     input:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
-        code=code("lod_export"),
     output:
         f"{STAGE}/lod_export/lod_{{k}}.npz",
     params:
+        *code("lod_export"),
         levels=SETTINGS["lod_export"],
     log:
         text=f"{STAGE}/lod_export/log_{{k}}.txt",
         cost=f"{STAGE}/lod_export/cost_{{k}}.json",
     shell:
-        RUN + "lod_export --scene {input.scene:q} --casters {input.casters:q} --levels {params.levels:q} --units m"
+        "{PYTHON:q} -m stages.lod_export --scene {input.scene:q} --casters {input.casters:q} --levels {params.levels:q} --units m"
         " --level-index {wildcards.k} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
 
@@ -250,12 +269,12 @@ rule package:
         casters=rules.tessellate.output,
         textures=rules.budget_reduce.output.textures,
         lods=expand(rules.lod_export.output, k=LEVELS),
-        code=code("package"),
     output:
         combined=f"{OUT}/scene.glb",
         levels=[f"{OUT}/scene_LOD{k}.{end}" for k in LEVELS for end in ("gltf", "bin")],
         manifest=f"{OUT}/lods.json",
     params:
+        *code("package"),
         settings=SETTINGS["package"],
         materials=scene.slices["materials"],
         results=OUT,
@@ -263,7 +282,7 @@ rule package:
         text=f"{STAGE}/package/log.txt",
         cost=f"{STAGE}/package/cost.json",
     shell:
-        RUN + "package --scene {input.scene:q} --casters {input.casters:q} --textures {input.textures:q}"
+        "{PYTHON:q} -m stages.package --scene {input.scene:q} --casters {input.casters:q} --textures {input.textures:q}"
         " --lods {input.lods:q} --materials {params.materials:q} --settings {params.settings:q} --results {params.results:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
@@ -279,18 +298,18 @@ rule report:
         textures=rules.budget_reduce.output.textures,
         budget=rules.budget_reduce.output.table,
         lods=rules.package.output.manifest,
-        code=code("report"),
     output:
         html=f"{OUT}/report.html",
         json=f"{OUT}/report.json",
     params:
+        *code("report"),
         settings=SETTINGS["report"],
         results=OUT,
     log:
         text=f"{STAGE}/report/log.txt",
         cost=f"{STAGE}/report/cost.json",
     shell:
-        RUN + "report --results {params.results:q} --scene {input.scene:q} --casters {input.casters:q}"
+        "{PYTHON:q} -m stages.report --results {params.results:q} --scene {input.scene:q} --casters {input.casters:q}"
         " --solution {input.solution:q} --direct {input.direct:q} --indirect {input.indirect:q} --maps {input.maps:q}"
         " --textures {input.textures:q} --budget {input.budget:q} --lods {input.lods:q} --settings {params.settings:q}"
         " --out-html {output.html:q} --out-json {output.json:q} --log {log.text:q} --cost {log.cost:q}"

@@ -1,7 +1,8 @@
 """The frame every stage's `main` hangs in: arguments, log, cost, and plain errors on the terminal.
 
-A stage is `main(argv) = run(__doc__, arguments, body, argv)`: `arguments(parser)` names its files and settings, `body(args, cost)` loads,
-calls and saves.  Every stage takes `--log FILE` (messages, beside the result) and `--cost FILE` (seconds, memory, rays as JSON).
+A stage is `main(argv) = run(__doc__, arguments, body, argv)`: `arguments(parser)` names its files and settings,
+`body(args, cost)` loads, calls and saves.  Every stage takes `--log FILE` (messages, beside the result) and
+`--cost FILE` (seconds, memory, rays as JSON).
 """
 
 import argparse
@@ -11,20 +12,26 @@ import resource
 import sys
 import time
 import traceback
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from lib.formats.artefact import ArtefactError, write_json
+from lib.formats.artefact import ArtefactError, read_json, write_json
 from lib.refusal import Refusal
 
 
 @dataclass
 class Cost:
-    """What a job spent: rays are counted by the stage, times and memory by the door; `notes` are savings worth a number."""
+    """What a job spent: rays are counted by the stage, times and memory by the door.
+
+    notes : savings worth a number
+    stopped : why the job stopped, empty if it did not
+    """
 
     stage: str
     rays: int = 0
     notes: dict = field(default_factory=dict)
+    stopped: str = ""
     started: float = field(default_factory=time.monotonic)
 
     def as_dict(self):
@@ -39,6 +46,7 @@ class Cost:
             "rays": int(self.rays),
             "notes": self.notes,
             "run": os.environ.get("BAKE_RUN", ""),
+            **({"stopped": self.stopped} if self.stopped else {}),
         }
 
 
@@ -90,15 +98,37 @@ def run(doc, arguments, body, argv=None):
     try:
         body(args, cost)
     except (Refusal, ArtefactError) as error:
-        print(str(error), file=sys.stderr, flush=True)
-        log.add(str(error))
+        cost.stopped = _named(error)
+        print(cost.stopped, file=sys.stderr, flush=True)
+        log.add(cost.stopped)
         return 1
-    except Exception:  # a fault of ours: the whole story goes to the terminal and to the log
+    except Exception as error:  # a fault of ours: the whole story goes to the terminal and to the log
+        cost.stopped = f"{cost.stage}: {type(error).__name__}: {error}; a fault of this program"
         log.add(traceback.format_exc())
         raise
     finally:
         _open_logs.pop()
+        if cost.stopped and args.cost:
+            with suppress(ArtefactError):  # the disk may be what stopped it
+                write_json(args.cost, cost.as_dict())
     if args.cost:
         write_json(args.cost, cost.as_dict())
     log.add(json.dumps(cost.as_dict()))
     return 0
+
+
+def _named(error):
+    """The message, after the scene's file as the user gave it (BAKE_SCENE) where a setting is refused without one."""
+    text, file = str(error), os.environ.get("BAKE_SCENE", "")
+    return f"{file}: {text}" if file and isinstance(error, Refusal) and not text.startswith(file) else text
+
+
+def stopped(folder, run):
+    """Why jobs below `folder` stopped in this run: a line each, from the records they left."""
+    lines = []
+    for path in sorted(Path(folder).glob("**/*cost*.json")):
+        with suppress(ArtefactError):
+            record = read_json(path)
+            if record.get("run") == run and record.get("stopped"):
+                lines.append(record["stopped"])
+    return lines

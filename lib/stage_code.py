@@ -6,6 +6,7 @@ by reading the sources, so an edit re-runs the stages that reach the edited modu
 
 import ast
 import functools
+import hashlib
 import os
 import re
 
@@ -118,3 +119,20 @@ def stage_code(stage, root="."):
         found |= {f"{p}/__init__.py" for p in packages if any(f"{name}/".startswith(f"{p}/") for name in paths)}
         front |= (found | set(_data_files(path, source, data))) - reached
     return sorted(path if root == "." else os.path.join(root, path) for path in reached)
+
+
+def stage_digests(stage, root="."):
+    """The files of `stage_code`, each as "path digest": its path below root and 12 hex digits of its SHA-256.
+
+    As params of a rule they re-run it for an edit, and for nothing else: not for a time stamp or another place of root.
+    """
+    files = [os.path.relpath(path, root) for path in stage_code(stage, root)]
+    stamps = _listing(os.fspath(root))
+    return [f"{path} {_digest(os.path.join(root, path), stamps[path])}" for path in files]
+
+
+@functools.cache
+def _digest(path, stamp):
+    """Stamp is (mtime, size), so that an edited file is read anew."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()[:12]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from lib.stage_code import import_statements, imported_modules, stage_code
+from lib.stage_code import import_statements, imported_modules, stage_code, stage_digests
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -84,6 +84,19 @@ def test_root_dot_gives_relative_paths(tmp_path, monkeypatch):
     tree(tmp_path, {"stages/bake.py": "import lib.a\n", "lib/a.py": ""})
     monkeypatch.chdir(tmp_path)
     assert stage_code("bake") == ["lib/a.py", "stages/bake.py"]
+
+
+def test_digests_move_with_the_content_alone(tmp_path):
+    files = {"stages/bake.py": "import lib.a\n", "lib/a.py": "A = 1\n", "lib/b.py": ""}
+    first, second = tree(tmp_path / "here", files), tree(tmp_path / "there", files)
+    found = stage_digests("bake", first)
+    assert [text.split()[0] for text in found] == ["lib/a.py", "stages/bake.py"]
+    assert stage_digests("bake", second) == found  # wherever the checkout lies
+    tree(tmp_path / "there", {"lib/b.py": "B = 1\n"})
+    assert stage_digests("bake", second) == found
+    tree(tmp_path / "there", {"lib/a.py": "A = 2\n"})
+    moved = stage_digests("bake", second)
+    assert moved[1] == found[1] and moved[0] != found[0]
 
 
 def test_unknown_stage_and_broken_source_are_refused(tmp_path):

@@ -33,7 +33,8 @@ _FIELDS = (
 class Preflight:
     """A checked scene.
 
-    folder : absolute Path of the scene;  name : its cleaned name, that of its results folder
+    folder : absolute Path of the scene;  file : its scene.yaml as the user named it, for messages
+    name : its cleaned name, that of its results folder
     settings : nested dict with every default filled in and units resolved (see settings.resolve)
     names, files, roles, is_black, area : per surface, ordered by name (area in m^2)
     groups : names of the light groups
@@ -45,6 +46,7 @@ class Preflight:
     """
 
     folder: Path
+    file: str
     name: str
     settings: dict
     names: list
@@ -81,7 +83,7 @@ def load(folder, overrides=None, results_root="results"):
     kept = _kept(home / "preflight.json", key, absolute)
     if kept is None:
         kept = _make(given, overrides, home, key, absolute)
-    return Preflight(absolute, name, **{field: kept[field] for field in _FIELDS})
+    return Preflight(absolute, str(given / "scene.yaml"), name, **{field: kept[field] for field in _FIELDS})
 
 
 def _cleaned(name):
