@@ -1,11 +1,15 @@
 """Cut one level of detail of the whole scene from the exact surfaces, and measure how far it is from them.
 
-reads   scene.npz, casters.npz                                     (lib.formats.scene, .casters)
+reads   scene.npz, casters.npz; textures.npz if light is to be stored in vertices
+                                                                   (lib.formats.scene, .casters, .textured_maps)
         levels: JSON list, finest first, of {"deviation": length}, {"triangles": n}, {"share": x} or a bare share
 writes  lod_<k>.npz                                                (lib.formats.lod_mesh)
 
 A length is a number in the scene's unit, text like "0.5 mm", or "0.01 %" of the scene's largest side.  A share is one
 of the first level's triangles, or of a level of 0.01 % deviation where the first is a share itself.
+
+With textures.npz, surfaces of reconstruction `gouraud`, and `auto` ones whose map is at its smallest, get vertices on
+every line of their map's lattice.
 """
 
 import json
@@ -13,7 +17,7 @@ import json
 import numpy as np
 
 from lib import door
-from lib.formats import casters, lod_mesh, scene
+from lib.formats import casters, lod_mesh, scene, textured_maps
 from lib.formats.quantities import METRES, metres
 from lib.lod.levels import DEVIATION, Scene, TooFine
 from lib.nurbs import tessellate
@@ -23,6 +27,7 @@ from lib.refusal import refusal
 def arguments(parser):
     parser.add_argument("--scene", required=True, metavar="FILE", help="scene.npz")
     parser.add_argument("--casters", required=True, metavar="FILE", help="casters.npz")
+    parser.add_argument("--textures", metavar="FILE", help="textures.npz, for light in vertices")
     parser.add_argument("--levels", required=True, type=json.loads, metavar="JSON", help="all levels, finest first")
     parser.add_argument("--level-index", required=True, type=int, metavar="K", help="which of them to cut, from 0")
     parser.add_argument("--units", default="m", choices=sorted(METRES), help="of lengths without a unit (default m)")
@@ -37,7 +42,7 @@ def body(args, cost):
     surfaces = tessellate.into_frame(x.surfaces, shapes.centre, shapes.scale)
     k, asked = args.level_index, levels[args.level_index]
     try:
-        level = cut(Scene(surfaces, shapes), levels, k, args.units, shapes.scale)
+        level = cut(Scene(surfaces, shapes, lattice(x, args.textures)), levels, k, args.units, shapes.scale)
     except TooFine as error:
         raise refusal(f"{json.dumps(asked)} {error}", field=f"lods[{k}]") from None
     note = ""
@@ -46,6 +51,20 @@ def body(args, cost):
         door.warn(f"lods[{k}]: {note}")
     lod_mesh.save(args.out, in_metres(level, shapes, np.asarray(x.flip, dtype=bool), k, asked, note))
     cost.notes.update(level=k, triangles=len(level.mesh.F), distance=float(level.mesh.distance.max()) * shapes.scale)
+
+
+def lattice(x, textures):
+    """{surface: (u, v)} the inner lattice lines of the maps whose light goes into vertices."""
+    if textures is None or "gouraud" not in x.reconstruction and "auto" not in x.reconstruction:
+        return {}
+    maps = textured_maps.load(textures)
+    out = {}
+    for k, s in enumerate(maps.final.surface.tolist()):
+        is_smallest = maps.final.level[k] == 0 and not maps.textured[k]
+        if x.reconstruction[s] == "gouraud" or (x.reconstruction[s] == "auto" and is_smallest):
+            h, w = maps.final.hidden_map(k).shape
+            out[s] = (np.arange(1, w - 1) / (w - 1), np.arange(1, h - 1) / (h - 1))
+    return out
 
 
 def cut(pieces, levels, k, units, scale):

@@ -48,11 +48,14 @@ class Level:
 
 
 class Scene:
-    """Surfaces (n,) in their frame, with what `tessellate.shapes` knows of them; levels are cut from it."""
+    """Surfaces (n,) in their frame, with what `tessellate.shapes` knows of them; levels are cut from it.
 
-    def __init__(self, surfaces, known):
+    lattice : {surface: (u, v)} interior parameters that have a line in every level, for light stored in vertices
+    """
+
+    def __init__(self, surfaces, known, lattice=None):
         self.surfaces, self.known = surfaces, known
-        self.plan = tessellate.plan(surfaces, known)
+        self.plan = tessellate.plan(surfaces, known, lattice)
         self.size = known.extent.max(axis=1)
 
     def slide(self, tolerance):

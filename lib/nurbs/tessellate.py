@@ -5,7 +5,7 @@ equal speed, along seams and at poles the vertices of all sides take the positio
 nothing can slip through.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -90,11 +90,17 @@ def shapes(surfaces, takes_part):
     )
 
 
-def plan(surfaces, known):
-    """Everything about where lines go that does not depend on a tolerance (lib.nurbs.lines.Plan)."""
+def plan(surfaces, known, lattice=None):
+    """Everything about where lines go that does not depend on a tolerance (lib.nurbs.lines.Plan).
+
+    lattice : {surface: (u, v)} interior parameters that must have a line whatever the shape
+    """
     demands = [
         find_lines.demand(s, c, p) for s, c, p in zip(surfaces, known.is_closed, known.is_collapsed, strict=True)
     ]
+    for s, forced in (lattice or {}).items():
+        kinks = tuple(np.union1d(own, more) for own, more in zip(demands[s].kinks, forced, strict=True))
+        demands[s] = replace(demands[s], kinks=kinks)
     return find_lines.plan(demands, find_lines.links(len(surfaces), known.borders))
 
 

@@ -29,12 +29,14 @@ def main(results):
     maps = textured_maps.load(stages / "budget_reduce" / "textures.npz")
     level = lod_mesh.load(stages / "lod_export" / "lod_0.npz")
     lods = read_json(Path(results) / "lods.json")
-    chosen = probes_of_walls(x, shapes, maps, lods["exposure"]) + probes_of_lamps(x, shapes, lods["exposure"])
+    chosen = probes_of_walls(x, shapes, maps, lods["exposure"], lods["in_vertices"]) + probes_of_lamps(
+        x, shapes, lods["exposure"]
+    )
     counts = {"meshes": int((np.diff(level.face_start) > 0).sum()), "triangles": len(level.F)}
     print(json.dumps({"counts": {**counts, "textures": len(lods["textures"])}, "probes": chosen}))
 
 
-def probes_of_walls(x, shapes, maps, exposure):
+def probes_of_walls(x, shapes, maps, exposure, in_vertices):
     """Up to WALLS surfaces, the largest first, and the sample of each quarter where the light changes least."""
     out = []
     order = sorted(range(len(maps.final)), key=lambda k: -shapes.area[maps.final.surface[k]])
@@ -42,7 +44,7 @@ def probes_of_walls(x, shapes, maps, exposure):
         s = int(maps.final.surface[k])
         value, hidden = maps.final.map(k), maps.final.hidden_map(k)
         h, w = hidden.shape
-        if x.E[s].any() or h < 3 or w < 3 or not value.any():
+        if x.names[s] in in_vertices or x.E[s].any() or h < 3 or w < 3 or not value.any():
             continue
         codes = code(value, exposure)
         corners = [(slice(j, h - 2 + j), slice(i, w - 2 + i)) for j in range(3) for i in range(3)]

@@ -1,5 +1,6 @@
 """Stage package: what a viewer finds, colours, exposure, shared textures, leftovers."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -109,6 +110,48 @@ def test_exposure_takes_the_brightest_reflected_percent_to_white(files):
     assert material["extras"]["moeller_bake"] == {"unit": "B_over_pi", "encoding": "srgb", "exposure": found}
     dark = mapset.pack([0], [[1, 1]], [0], [np.zeros((2, 2, 3))])
     assert exposure.automatic(dark, np.ones(1)) == 1.0
+
+
+def reconstruct(files, ways, level=2):
+    """Store the scene and maps again with reconstructions {surface index: way}; cut the levels with the maps known."""
+    x = scene.load(files / "scene.npz")
+    x.reconstruction[:] = [ways.get(s, "texture") for s in range(len(x.names))]
+    scene.save(files / "scene.npz", x)
+    maps = textured_maps.load(files / "textures.npz")
+    if level == 0:
+        corners = np.array([[[0.1, 0.1, 0.1], [0.3, 0.2, 0.1]], [[0.2, 0.2, 0.2], [0.4, 0.3, 0.2]]])
+        packed = mapset.pack(np.arange(1, 8), [[1, 1]] * 7, [0] * 7, [corners] * 7)
+        maps = dataclasses.replace(maps, light=packed, final=packed)
+        textured_maps.save(files / "textures.npz", maps)
+    argv = ["--scene", files / "scene.npz", "--casters", files / "casters.npz", "--textures", files / "textures.npz"]
+    for k in range(len(LEVELS)):
+        more = ["--levels", json.dumps(LEVELS), "--level-index", k, "--out", files / f"lod_{k}.npz"]
+        assert lod_export.main([str(a) for a in (*argv, *more)]) == 0
+    return maps
+
+
+def test_gouraud_puts_the_map_into_vertices_on_its_lattice(files):
+    maps = reconstruct(files, {7: "gouraud"})
+    _, results = run(files, {"exposure": 2.0})
+    assert read_json(results / "lods.json")["in_vertices"] == ["picture"]
+    assert [p.name for p in (results / "textures").iterdir()] == ["001-s.png"]
+    for k in (0, 1):
+        [part] = [p for p in exported.load(results / f"scene_LOD{k}.gltf")[0] if p.name == "picture"]
+        assert part.texture == -1 and part.ST is None and len(part.V) == 25 and len(part.F) == 32
+        u, v = part.V[:, 0], part.V[:, 1]  # the picture stands in the plane of x and, y up, y
+        w = np.rint(u * 4).astype(int), np.rint(v * 4).astype(int)
+        assert np.allclose(part.colour, maps.final.map(6)[w[1], w[0]] / np.pi * 2, atol=1e-6)
+
+
+def test_auto_uses_vertices_only_where_nothing_shows(files):
+    reconstruct(files, {1: "auto", 7: "auto"})
+    _, results = run(files)
+    assert read_json(results / "lods.json")["in_vertices"] == []
+    reconstruct(files, {2: "auto", 7: "auto"}, level=0)
+    _, results = run(files)
+    assert read_json(results / "lods.json")["in_vertices"] == ["box/2", "picture"]
+    [part] = [p for p in exported.load(results / "scene.glb")[0] if p.name == "picture"]
+    assert len(part.F) == 2 and part.colour is not None
 
 
 def test_leftovers_of_an_earlier_run_go(files):
