@@ -26,7 +26,7 @@ def test_a_twisted_cell_shows_its_diagonal():
     flat = np.array([[0.2, 0.4], [0.3, 0.5]])[..., None].repeat(3, axis=2)
     assert gouraud.is_untwisted(flat)
     twisted = flat.copy()
-    twisted[1, 1, 1] += 0.05  # 0.0125 off in the middle: 3.6 of 255 there
+    twisted[1, 1, 1] += 0.05  # 0.0125 off in the middle: 2.6 of 255 there
     assert not gouraud.is_untwisted(twisted)
 
 
