@@ -54,11 +54,11 @@ def body(args, cost):
 
 
 def unpacked(x, world):
-    """{surface: (value, hidden, penumbra, level)} on the base lattices of a chunk of sample."""
+    """{surface: (value, hidden, noise, level)} on the base lattices of a chunk of sample."""
     out = {}
     for k, s in enumerate(x.surface):
         part, shape = slice(x.first[k], x.first[k + 1]), world.lattices[s].shape(x.level[k])
-        out[int(s)] = x.value[part].reshape(*shape, -1), x.hidden[part].reshape(shape), x.penumbra[part].reshape(shape), int(x.level[k])
+        out[int(s)] = x.value[part].reshape(*shape, -1), x.hidden[part].reshape(shape), x.noise[part].reshape(shape), int(x.level[k])
     return out
 
 

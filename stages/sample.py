@@ -46,7 +46,7 @@ def packed(surfaces, base, lit, elements, grids, groups):
     """Samples from per-surface pieces."""
     lattices, levels = [base[s][:3] for s in surfaces], [base[s][3] for s in surfaces]
     fields = [np.concatenate([np.zeros((0, *a[0].shape[2:]), a[0].dtype), *(x.reshape(-1, *x.shape[2:]) for x in a)])
-              for a in zip(*lattices, strict=True)] or [np.zeros((0, 3 * groups), np.float32), np.zeros(0, bool), np.zeros(0, bool)]
+              for a in zip(*lattices, strict=True)] or [np.zeros((0, 3 * groups), np.float32), np.zeros(0, bool), np.zeros(0, np.float32)]
     rows = [e.rows for e in elements]
     width = rows[0].entries.shape[1] if rows else 1
     return samples.Samples(

@@ -8,7 +8,7 @@ that bounces changes within such distances (Ward et al. 1988), and a contact can
 
 import numpy as np
 
-from lib.elements.balance import balance, children
+from lib.elements.balance import balance, children, grow
 
 WIDE, WIDE_LEVELS = 1.0, 2  # root-cell widths; levels below the base
 
@@ -22,7 +22,7 @@ class Quadtree:
 
     lattice : Lattice; side : length of a root cell in the scene's frame
     level : of the arrays below, which hold the whole lattice of that level
-    value (h, w, C) float32, known, hidden (h, w) bool, noise (h, w) float32 standard error of the sample,
+    value (h, w, C) float32, known, hidden (h, w) bool, noise (h, w) float32 standard error of the sample, 0 if it has none,
         reach (h, w) float32 free space above it in the scene's frame, inf where nobody asked
     divided : list of (n_v 2^l, n_u 2^l) bool for l < level
     """
@@ -35,6 +35,7 @@ class Quadtree:
         self.reach = np.full(shape, np.inf, dtype=np.float32)
         self.known = np.zeros(shape, dtype=bool)
         self.hidden = np.zeros(shape, dtype=bool)
+        self._sure = np.zeros(shape, dtype=bool)
         self.divided = [np.ones(lattice.cells(level), dtype=bool) for level in range(base)]
         self._wanted = lattice.is_own(base)
 
@@ -42,14 +43,27 @@ class Quadtree:
         """Crossings j, i (m,) of the current level that must be measured next."""
         return np.nonzero(self._wanted)
 
-    def put(self, value, hidden, noise, reach):
-        """Store the samples of wanted(), in its order: value (m, C); hidden, noise, reach (m,)."""
-        self.value[self._wanted], self.hidden[self._wanted] = value, hidden
-        self.noise[self._wanted], self.reach[self._wanted] = noise, reach
-        self.known |= self._wanted
-        self._wanted = np.zeros_like(self.known)
+    def put(self, at, value, hidden, noise, reach):
+        """Store samples at crossings `at` (j, i): value (m, C); hidden, noise, reach (m,) or numbers."""
+        self.value[at], self.hidden[at], self.noise[at], self.reach[at], self.known[at] = value, hidden, noise, reach, True
+        self._wanted[at] = False
         for array in (self.value, self.hidden, self.noise, self.reach, self.known):
             self.lattice.copy_own(array)
+
+    def doubtful(self):
+        """Crossings j, i (m,) measured without noise beside one with noise, each named once.
+
+        A few shadow rays agree by chance at the rim of a penumbra; more of them draw the rim smoothly.
+        """
+        noisy = self.noise > 0
+        if not noisy.any():
+            return np.nonzero(np.zeros_like(noisy))
+        beside = grow(noisy, self.lattice.closed)
+        if min(noisy.shape) > 4:
+            beside[::2, ::2] |= grow(noisy[::2, ::2], self.lattice.closed)
+        doubt = beside & ~noisy & self.known & ~self.hidden & ~self._sure & self.lattice.is_own(self.level)
+        self._sure |= doubt
+        return np.nonzero(doubt)
 
     def split(self, tau, top):
         """Divide leaves above the threshold tau, up to level `top`; balance.  Returns True when new samples are wanted."""
@@ -122,7 +136,7 @@ class Quadtree:
     def _deepen(self):
         self.level += 1
         shape = self.lattice.shape(self.level)
-        for name in ("value", "noise", "reach", "known", "hidden"):
+        for name in ("value", "noise", "reach", "known", "hidden", "_sure"):
             old = getattr(self, name)
             new = np.zeros((*shape, *old.shape[2:]), dtype=old.dtype)
             new[::2, ::2] = old

@@ -14,43 +14,55 @@ USUAL_CONTRAST = 0.6
 SMOOTH = 0.25  # dividing a cell once more leaves a quarter of the departure of a smooth field
 
 
-def refine(world, trees, sample, seed, tau, top):
+def refine(world, trees, sample, seed, tau, top, recheck=None):
     """Measure and divide until every leaf is within its threshold.
 
-    trees : {surface: Quadtree}, whose wanted() samples are missing; sample(points) -> value (n, C), hidden, noise, reach (n,)
+    trees : {surface: Quadtree}, whose wanted() samples are missing
+    sample(points) -> value (n, C), hidden, noise, reach (n,); recheck: the same with more effort, for doubtful() samples
     tau : {surface: threshold [W/m^2]}; top : deepest level.  Works on the trees in place.
     """
-    active = sorted(s for s in trees if len(trees[s].wanted()[0]) or trees[s].split(tau[s], top))
+    active = sorted(trees)
     while active:
-        wanted = {s: trees[s].wanted() for s in active}
-        points = points_at(world, seed, wanted, {s: trees[s].level for s in active})
-        value, hidden, noise, reach = sample(points)
-        first = 0
-        for s in active:
-            part = slice(first, first + len(wanted[s][0]))
-            first = part.stop
-            trees[s].put(value[part], hidden[part], noise[part], reach[part])
+        _measure(world, trees, {s: trees[s].wanted() for s in active}, sample, seed)
+        if recheck:
+            _measure(world, trees, {s: trees[s].doubtful() for s in active}, recheck, seed)
         active = [s for s in active if trees[s].split(tau[s], top)]
+
+
+def _measure(world, trees, at, sample, seed):
+    """Put the samples of all trees at crossings {surface: (j, i)}, measured in one batch."""
+    at = {s: place for s, place in at.items() if len(place[0])}
+    if not at:
+        return
+    measured = sample(points_at(world, seed, at, {s: trees[s].level for s in at}))
+    first = 0
+    for s, place in at.items():
+        part = slice(first, first + len(place[0]))
+        first = part.stop
+        trees[s].put(place, *(array[part] for array in measured))
 
 
 def refine_direct(world, base, seed, tau, top, shadow_rays):
     """Direct trees from their base lattices.
 
-    base : {surface: (value (h, w, C), hidden, penumbra, level)}.  Returns {surface: Quadtree} and counts of spared rays.
+    base : {surface: (value (h, w, C), hidden, noise, level)}.  Returns {surface: Quadtree} and counts of spared rays.
     """
     trees, spared = {}, np.zeros(3, dtype=np.int64)
-    for s, (value, hidden, _, level) in base.items():
+    for s, (value, hidden, noise, level) in base.items():
         trees[s] = Quadtree(world.lattices[s], level, world.channels, world.side(s))
         own = trees[s].wanted()
-        trees[s].put(value[own], hidden[own], 0.0, np.inf)
+        trees[s].put(own, value[own], hidden[own], noise[own], np.inf)
 
-    def sample(points):
-        light, buried = direct_at(world, points, shadow_rays)
-        spared[:] += light.below_horizon, light.dim, light.agreed
-        none = np.zeros(len(buried), dtype=np.float32)
-        return light.H.reshape(len(buried), -1), buried, none, none + np.inf
+    def sampler(rays):
+        def sample(points):
+            light, buried = direct_at(world, points, rays)
+            spared[:] += light.below_horizon, light.dim, light.agreed
+            return light.H.reshape(len(buried), -1), buried, light.noise, np.full(len(buried), np.inf, dtype=np.float32)
 
-    refine(world, trees, sample, seed, tau, top)
+        return sample
+
+    n0, n1 = shadow_rays
+    refine(world, trees, sampler((n0, n1)), seed, tau, top, recheck=sampler((n1, n1)))
     return trees, spared
 
 

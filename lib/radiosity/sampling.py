@@ -73,7 +73,7 @@ def hidden_at(world, x, N, shifts):
 
 
 def base_lattice(world, surfaces, seed, level, shadow_rays):
-    """Direct light on the base lattices: {surface: (value (h, w, 3 G), hidden, penumbra (h, w), level)} and DirectLight's counts.
+    """Direct light on the base lattices: {surface: (value (h, w, 3 G), hidden, noise (h, w), level)} and DirectLight's counts.
 
     level : of large surfaces; smaller ones begin coarser.
     """
@@ -89,9 +89,9 @@ def base_lattice(world, surfaces, seed, level, shadow_rays):
         first += len(j)
         shape = world.lattices[s].shape(level_of[s])
         value = np.zeros((*shape, world.channels), dtype=np.float32)
-        shade, penumbra = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=bool)
-        value[j, i], shade[j, i], penumbra[j, i] = light.H[part].reshape(len(j), -1), hidden[part], light.is_penumbra[part]
-        out[s] = (*(world.lattices[s].copy_own(array) for array in (value, shade, penumbra)), level_of[s])
+        shade, noise = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=np.float32)
+        value[j, i], shade[j, i], noise[j, i] = light.H[part].reshape(len(j), -1), hidden[part], light.noise[part]
+        out[s] = (*(world.lattices[s].copy_own(array) for array in (value, shade, noise)), level_of[s])
     return out, (light.below_horizon, light.dim, light.agreed)
 
 
