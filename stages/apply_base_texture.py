@@ -2,7 +2,8 @@
 
 reads   scene.npz, light maps of every chunk, materials and textures JSON    (lib.formats.scene, .light_maps; pictures)
         materials: {"rho_avg": {surface: [r, g, b]}}
-        textures:  {"textures": {surface: {"file": path, "colour_space": "srgb", "repeat": [n, m]}}}
+        textures:  {"textures": {surface: {"file": path, "colour_space": "srgb", "repeat": [n, m]}}}, paths relative
+                   to the scene's folder, which folder.json beside it names
         settings:  {"texture_level": 10, "intensity": {group: factor or [r, g, b]}}
 writes  textured maps of all surfaces                                         (lib.formats.textured_maps)
         MAPS_FOLDER/<surface>.exr for each surface: B without base texture, full size
@@ -38,7 +39,7 @@ def body(args, cost):
     x = scene.load(args.scene)
     chunk = light_maps.merge([light_maps.load(path) for path in args.maps])
     rho_avg = read_json(args.materials)["rho_avg"]
-    textures = read_json(args.textures)["textures"]
+    textures = located(read_json(args.textures)["textures"], Path(args.textures).parent / "folder.json")
     texture_level = checked_level(args.settings.get("texture_level", 10))
     weights = group_weights(x.groups, args.settings.get("intensity", {}), chunk.maps.value.shape[1])
 
@@ -85,6 +86,14 @@ def body(args, cost):
             stats=chunk.stats,
         ),
     )
+
+
+def located(textures, folder_file):
+    """The textures with their paths below the scene's folder, so that the file which names them can be moved with it."""
+    if all(Path(row["file"]).is_absolute() for row in textures.values()):
+        return textures
+    folder = Path(read_json(folder_file)["folder"])
+    return {name: {**row, "file": str(folder / row["file"])} for name, row in textures.items()}
 
 
 def checked_level(level):

@@ -6,7 +6,7 @@ one as its input re-runs for what is in it and for nothing else.
 
     geometry-<hash>.json    what import_scene needs (see scene_import)
     materials-<hash>.json   {"rho_avg": {surface: [r, g, b]}}
-    textures-<hash>.json    {"textures": {surface: {file, colour_space, repeat, digest}}}
+    textures-<hash>.json    {"textures": {surface: {file (relative to the folder), colour_space, repeat, digest}}}
     folder.json             {"folder", "file"}: where the scene lies; no rule's input
 
 The outcome is kept in preflight.json under the content of all it was made from; a parse that finds nothing changed
@@ -21,7 +21,7 @@ from pathlib import Path
 
 from lib.refusal import Refusal, refusal
 
-VERSION = 1
+VERSION = 2
 ROOT = Path(__file__).resolve().parents[2]
 _FIELDS = (
     "settings", "names", "files", "roles", "is_black", "area", "groups", "textures", "rho_avg",

@@ -1,12 +1,15 @@
 """The slice of a scene's settings that each stage reads, and no more: what is not in a slice can not re-run its stage."""
 
 import json
+import re
 
 from lib.radiosity.quality import quality
 
 RAYS_A_JOB = 12e6  # about 4 s of one core
 MOST_CHUNKS = 64
 SHADOW_RAYS = 24  # a sample, of a few lights in view
+GATHER_RAYS = 0.16  # of a sample, an element of the coarse solution: what a tolerance asks for that goes with as many
+MOST_WARNINGS = 100  # told the report: they are part of a command line
 
 
 def rule_settings(settings, warnings=()):
@@ -37,10 +40,20 @@ def rule_settings(settings, warnings=()):
             "camera": settings["camera"],
             "units": "m",
             "up": settings["up"],
-            "warnings": list(warnings),
+            "warnings": _first(list(warnings)),
         },
     }
-    return {stage: json.dumps(content, sort_keys=True) for stage, content in slices.items()}
+    return {stage: _text(content) for stage, content in slices.items()}
+
+
+def _first(warnings):
+    rest = len(warnings) - MOST_WARNINGS
+    return warnings[:MOST_WARNINGS] + ([f"and {rest} more, see the terminal"] if rest > 0 else [])
+
+
+def _text(content):
+    """JSON in which no text holds {name}, which Snakemake would take for a wildcard: the brace as its escape."""
+    return re.sub(r"\{(?=\s*[.\w])", r"\\u007b", json.dumps(content, sort_keys=True))
 
 
 def chosen_quality(bake):
@@ -54,11 +67,14 @@ def chosen_quality(bake):
 
 
 def n_chunks(settings, n_maps):
-    """Number of jobs the surfaces are shared among: asked for, or by the rays the scene will need."""
+    """Number of jobs the surfaces are shared among: asked for, or by the rays the scene will need.
+
+    The tolerance counts by the number of elements alone, which changes in steps: within a step no sample is made again.
+    """
     asked = settings["bake"]["chunks"]
     if asked != "auto":
         return int(asked)
     q = chosen_quality(settings["bake"])
     samples = n_maps * (2**q["base_direct"] + 1) ** 2
-    rays = 3 * samples * SHADOW_RAYS + 3 * n_maps * (2 ** q["base_indirect"] + 1) ** 2 * q["gather_rays"]
+    rays = 3 * samples * SHADOW_RAYS + 3 * n_maps * (2 ** q["base_indirect"] + 1) ** 2 * GATHER_RAYS * q["n_elements"]
     return int(min(MOST_CHUNKS, max(1, -(-rays // RAYS_A_JOB))))

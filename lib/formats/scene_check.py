@@ -53,6 +53,7 @@ def run(folder, overrides=None):
     digests = {name: geometry_file.digest(source.folder / name) for name in _geometry_files(wanted)}
     pictures_used = {row["file"]: geometry_file.digest(row["file"]) for row in textures.values()}
     area = {one.name: one.area for one in placed}
+    materials = wanted.get("materials", {})
     outcome = {
         "settings": settings.resolve(wanted, float(frame(made.surfaces)[1])),
         "names": made.names,
@@ -71,7 +72,11 @@ def run(folder, overrides=None):
         "geometry": scene_import.geometry_slice(wanted, table, digests),
         "materials": {"rho_avg": rho_avg},
         "textures": {
-            "textures": {name: {**row, "digest": pictures_used[row["file"]]} for name, row in textures.items()}
+            "textures": {
+                name: {**row, "file": materials[material]["texture"], "digest": pictures_used[row["file"]]}
+                for name, material in zip(made.names, made.material, strict=True)
+                if (row := textures.get(name))
+            }
         },
     }
     scene_file = source.folder / "scene.yaml"
