@@ -27,7 +27,6 @@ except (Refusal, ArtefactError) as error:
 for warning in scene.warnings:
     print(f"warning: {warning}", file=sys.stderr)
 
-workflow.dag_settings.force_incomplete = True  # files are written whole or not at all: a job cut off is done again
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # jobs are the parallelism; idle threads cost start-up
 os.environ["PYTHONPATH"] = os.pathsep.join([workflow.basedir, *filter(None, [os.environ.get("PYTHONPATH")])])
 os.environ.setdefault("BAKE_RUN", uuid.uuid4().hex)  # tells this run's costs from those of earlier ones
