@@ -274,6 +274,19 @@ def test_teapot_faces_outwards():
     assert volume(body) == pytest.approx(0.75e-3, rel=0.02)  # a pot of three quarters of a litre
 
 
+def test_lid_lies_on_its_ledge_within_the_rim():
+    ledge = points(surface("fruit_room", "teapot_ledge/1"), 65)
+    lid = np.concatenate([points(s, 65) for s, _ in surfaces("fruit_room", "teapot/2[5-8]")])
+    rim = np.concatenate([points(s, 65) for s, _ in surfaces("fruit_room", "teapot/0[1-4]")])
+    assert np.ptp(ledge[:, 2]) < 1e-12
+    assert lid[:, 2].min() == pytest.approx(ledge[0, 2], abs=1e-9)
+    foot = rim[rim[:, 2] < rim[:, 2].min() + 1e-9]  # the inner and the outer edge of the rim
+    on_ledge, on_lid, on_rim = (np.linalg.norm(P[:, :2] - [2.54, 2.2], axis=1) for P in (ledge, lid, foot))
+    assert on_ledge.min() < on_lid.max() < on_ledge.max()
+    assert on_ledge.max() == pytest.approx(on_rim.min(), rel=1e-3)
+    assert frame(surface("fruit_room", "teapot_ledge/1"), [0.5], [0.5])[1][0, 2] > 0.99
+
+
 def test_duck_faces_outwards():
     beaks = surfaces("fruit_room", "duck/[23]")
     assert [flip for _, flip in surfaces("fruit_room", "duck/.")] == [True, True, False]
@@ -348,7 +361,9 @@ def test_heads_sit_on_their_plinths(side, number):
 
 
 def test_bench_stands():
-    assert lowest(*(s for s, _ in surfaces("monet_room", "block_.*"))) == 0
+    rug = points(surface("monet_room", "rug_top"), 2)[:, 2].max()
+    assert lowest(*(s for s, _ in surfaces("monet_room", "rug_(front|back|left|right)"))) == 0
+    assert lowest(*(s for s, _ in surfaces("monet_room", "block_.*"))) == pytest.approx(rug, abs=1e-12)
     below = points(surface("monet_room", "seat_below"), 2)[:, 2]
     for s, _ in surfaces("monet_room", "block_.*"):
         assert points(s, 2)[:, 2].max() == pytest.approx(below.max(), abs=1e-12)
@@ -415,6 +430,6 @@ def test_make_fruit_writes_the_same_bytes(tmp_path):
             shutil.copy(path, tmp_path)
     runpy.run_path(str(tmp_path / "make_fruit.py"), run_name="__main__")
     written = sorted(tmp_path.glob("*.json"))
-    assert len(written) == 9
+    assert len(written) == 10
     for path in written:
         assert path.read_bytes() == (SCENES / "fruit_room" / path.name).read_bytes(), path.name
