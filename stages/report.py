@@ -37,7 +37,7 @@ def body(args, cost):
     name = args.name or Path(bake.folder).resolve().name
     facts = figures.collect(name, bake, args.settings, os.environ.get("BAKE_RUN", ""))
     drawn, model = report_pictures.draw(bake, facts, args.settings)
-    write_json(args.out_json or bake.folder / "report.json", facts)
+    write_json(args.out_json or bake.folder / "report.json", {**facts, "camera": drawn.camera})
     report_html.save(args.out_html or bake.folder / "report.html", facts, drawn, model)
 
 

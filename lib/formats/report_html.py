@@ -39,11 +39,15 @@ class Thumbnail:
 
 @dataclass(frozen=True)
 class Pictures:
-    """PNG bytes: the finest level; per level the picture and the picture with its triangles; thumbnails by name."""
+    """PNG bytes: the finest level; per level the picture and the picture with its triangles; thumbnails by name.
+
+    camera : of the finest level's picture, {"eye", "target", "fov"} in metres, y up
+    """
 
     hero: bytes | None = None
     levels: list = field(default_factory=list)
     thumbnails: dict = field(default_factory=dict)
+    camera: dict | None = None
 
 
 def save(path, figures, pictures, model=None):

@@ -32,16 +32,17 @@ def draw(bake, facts, settings):
                 hero = png(picture.render(model, textures, view, *HERO))
             levels.append(tuple(png(shot) for shot in picture.render_with_edges(model, textures, near, *SMALL)))
             inlined.append(exported.inlined(path))
-        drawn = Pictures(hero, levels, map_thumbnails(bake, facts, png))
-    return drawn, None if None in inlined or not inlined else _viewer_model(inlined, view)
+        place = {"eye": [float(x) for x in view.eye], "target": [float(x) for x in view.target], "fov": float(view.fov)}
+        drawn = Pictures(hero, levels, map_thumbnails(bake, facts, png), place)
+    return drawn, None if None in inlined else _viewer_model(inlined, place)
 
 
-def _viewer_model(inlined, view):
+def _viewer_model(inlined, place):
     """What viewer.js reads: the levels as glTF documents, each picture once, where to stand."""
     return {
         "levels": [document for document, _ in inlined],
         "textures": {uri: data for _, named in inlined for uri, data in named.items()},
-        "camera": {"eye": list(view.eye), "target": list(view.target), "fov": view.fov},
+        "camera": place,
     }
 
 

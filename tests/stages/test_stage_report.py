@@ -252,6 +252,7 @@ def spoilt(results, tmp_path):
 def test_figures(results):
     facts = json.loads((results / "report.json").read_text())
     assert facts["scene"] == "my room"
+    assert facts["camera"] == {"eye": [1, 3, -0.5], "target": [1, 0, -0.5], "fov": 40}
     assert facts["totals"]["rays"] == 1000 and facts["run"] == {"id": "new", "rays": 0, "seconds": 1.5, "jobs": 1}
     assert [s["stage"] for s in facts["stages"]] == ["sample", "refine", "lod_export"]
     first = facts["surfaces"][0]
