@@ -23,7 +23,7 @@ ACTIVATE = PATH="$$PWD/.venv/bin:$$PATH"; export PATH
 
 bake: setup  ## set up, then bake data/scenes/fruit_room into results/fruit_room (the default)
 	@$(ACTIVATE)
-	snakemake --cores $(CORES) --quiet rules reason host
+	snakemake --cores $(CORES) --rerun-incomplete --quiet rules reason host
 	echo
 	echo "Report:  results/fruit_room/report.html"
 	echo "GLB:     results/fruit_room/scene.glb"

@@ -89,7 +89,7 @@ def body(args, cost):
 
 
 def located(textures, folder_file):
-    """The textures with their paths below the scene's folder, so that the file which names them can be moved with it."""
+    """The textures with their paths below the folder of the scene, wherever that has been moved."""
     if all(Path(row["file"]).is_absolute() for row in textures.values()):
         return textures
     folder = Path(read_json(folder_file)["folder"])
