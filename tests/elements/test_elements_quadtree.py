@@ -23,7 +23,7 @@ def grown(field, tau, top, lattice=SQUARE, base=1, side=1.0, hidden=None, channe
             np.asarray(field(u, v)).reshape(-1, 1) if channels == 1 else field(u, v), (len(u), channels)
         )
         shade = hidden(u, v) if hidden else np.zeros(len(u), dtype=bool)
-        tree.put(value, shade, 0.0, reach(u, v) if reach else np.inf)
+        tree.put((j, i), value, shade, 0.0, reach(u, v) if reach else np.inf)
         asked += len(u)
         if not tree.split(tau, top):
             break
