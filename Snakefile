@@ -32,6 +32,13 @@ os.environ["PYTHONPATH"] = os.pathsep.join([workflow.basedir, *filter(None, [os.
 os.environ.setdefault("BAKE_RUN", uuid.uuid4().hex)  # tells this run's costs from those of earlier ones
 os.environ["BAKE_SCENE"] = scene.file  # whose settings a job that refuses them names
 
+
+envvars:  # goes with jobs to other machines
+    "BAKE_RUN",
+    "BAKE_SCENE",
+
+
+
 PYTHON = sys.executable
 OUT = f"results/{scene.name}"
 STAGE = f"{OUT}/stages"
