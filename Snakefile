@@ -38,7 +38,6 @@ envvars:  # goes with jobs to other machines
     "BAKE_SCENE",
 
 
-
 PYTHON = sys.executable
 OUT = f"results/{scene.name}"
 STAGE = f"{OUT}/stages"
@@ -86,12 +85,12 @@ rule import_scene:
         geometry=watched(scene.geometry_files),
     output:
         f"{STAGE}/import_scene/scene.npz",
-    params:
-        *code("import_scene"),
-        slice=scene.slices["geometry"],
     log:
         text=f"{STAGE}/import_scene/log.txt",
         cost=f"{STAGE}/import_scene/cost.json",
+    params:
+        *code("import_scene"),
+        slice=scene.slices["geometry"],
     shell:
         "{PYTHON:q} -m stages.import_scene --scene-slice {params.slice:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
@@ -101,12 +100,12 @@ rule tessellate:
         scene=rules.import_scene.output,
     output:
         f"{STAGE}/tessellate/casters.npz",
-    params:
-        *code("tessellate"),
-        settings=SETTINGS["tessellate"],
     log:
         text=f"{STAGE}/tessellate/log.txt",
         cost=f"{STAGE}/tessellate/cost.json",
+    params:
+        *code("tessellate"),
+        settings=SETTINGS["tessellate"],
     shell:
         "{PYTHON:q} -m stages.tessellate --scene {input.scene:q} --settings {params.settings:q} --out {output:q}"
         " --log {log.text:q} --cost {log.cost:q}"
@@ -118,13 +117,13 @@ rule sample:
         casters=rules.tessellate.output,
     output:
         f"{STAGE}/sample/chunk_{{c}}.npz",
+    log:
+        text=f"{STAGE}/sample/log_{{c}}.txt",
+        cost=f"{STAGE}/sample/cost_{{c}}.json",
     params:
         *code("sample"),
         settings=SETTINGS["sample"],
         chunks=N_CHUNKS,
-    log:
-        text=f"{STAGE}/sample/log_{{c}}.txt",
-        cost=f"{STAGE}/sample/cost_{{c}}.json",
     shell:
         "{PYTHON:q} -m stages.sample --scene {input.scene:q} --casters {input.casters:q} --chunk {wildcards.c} --chunks {params.chunks}"
         " --settings {params.settings:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
@@ -137,13 +136,13 @@ rule shoot:
         samples=expand(rules.sample.output, c=CHUNKS),
     output:
         f"{STAGE}/shoot/solution.npz",
+    log:
+        text=f"{STAGE}/shoot/log.txt",
+        cost=f"{STAGE}/shoot/cost.json",
     params:
         *code("shoot"),
         settings=SETTINGS["shoot"],
         materials=scene.slices["materials"],
-    log:
-        text=f"{STAGE}/shoot/log.txt",
-        cost=f"{STAGE}/shoot/cost.json",
     shell:
         "{PYTHON:q} -m stages.shoot --scene {input.scene:q} --casters {input.casters:q} --samples {input.samples:q}"
         " --materials {params.materials:q} --settings {params.settings:q} --out {output:q}"
@@ -158,13 +157,13 @@ rule refine_direct:
         samples=rules.sample.output,
     output:
         f"{STAGE}/refine/direct_{{c}}.npz",
+    log:
+        text=f"{STAGE}/refine/log_direct_{{c}}.txt",
+        cost=f"{STAGE}/refine/cost_direct_{{c}}.json",
     params:
         *code("refine"),
         settings=SETTINGS["refine"],
         chunks=N_CHUNKS,
-    log:
-        text=f"{STAGE}/refine/log_direct_{{c}}.txt",
-        cost=f"{STAGE}/refine/cost_direct_{{c}}.json",
     shell:
         "{PYTHON:q} -m stages.refine --half direct --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
         " --samples {input.samples:q} --chunk {wildcards.c} --chunks {params.chunks} --settings {params.settings:q}"
@@ -179,13 +178,13 @@ rule refine_indirect:
         direct=expand(rules.refine_direct.output, c=CHUNKS),
     output:
         f"{STAGE}/refine/indirect_{{c}}.npz",
+    log:
+        text=f"{STAGE}/refine/log_indirect_{{c}}.txt",
+        cost=f"{STAGE}/refine/cost_indirect_{{c}}.json",
     params:
         *code("refine"),
         settings=SETTINGS["refine"],
         chunks=N_CHUNKS,
-    log:
-        text=f"{STAGE}/refine/log_indirect_{{c}}.txt",
-        cost=f"{STAGE}/refine/cost_indirect_{{c}}.json",
     shell:
         "{PYTHON:q} -m stages.refine --half indirect --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
         " --direct {input.direct:q} --chunk {wildcards.c} --chunks {params.chunks} --settings {params.settings:q}"
@@ -200,12 +199,12 @@ rule balance_resample:
         indirect=rules.refine_indirect.output,
     output:
         f"{STAGE}/balance_resample/chunk_{{c}}.npz",
-    params:
-        *code("balance_resample"),
-        settings=SETTINGS["balance_resample"],
     log:
         text=f"{STAGE}/balance_resample/log_{{c}}.txt",
         cost=f"{STAGE}/balance_resample/cost_{{c}}.json",
+    params:
+        *code("balance_resample"),
+        settings=SETTINGS["balance_resample"],
     shell:
         "{PYTHON:q} -m stages.balance_resample --scene {input.scene:q} --solution {input.solution:q} --direct {input.direct:q}"
         " --indirect {input.indirect:q} --settings {params.settings:q} --out {output:q}"
@@ -220,15 +219,15 @@ rule apply_base_texture:
     output:
         textured=f"{STAGE}/apply_base_texture/textured.npz",
         maps=MAPS,
+    log:
+        text=f"{STAGE}/apply_base_texture/log.txt",
+        cost=f"{STAGE}/apply_base_texture/cost.json",
     params:
         *code("apply_base_texture"),
         settings=SETTINGS["apply_base_texture"],
         materials=scene.slices["materials"],
         slice=scene.slices["textures"],
         folder=f"{OUT}/maps",
-    log:
-        text=f"{STAGE}/apply_base_texture/log.txt",
-        cost=f"{STAGE}/apply_base_texture/cost.json",
     shell:
         "{PYTHON:q} -m stages.apply_base_texture --scene {input.scene:q} --maps {input.maps:q} --materials {params.materials:q}"
         " --textures {params.slice:q} --settings {params.settings:q} --maps-folder {params.folder:q}"
@@ -242,12 +241,12 @@ rule budget_reduce:
     output:
         textures=f"{STAGE}/budget_reduce/textures.npz",
         table=f"{STAGE}/budget_reduce/budget.json",
-    params:
-        *code("budget_reduce"),
-        settings=SETTINGS["budget_reduce"],
     log:
         text=f"{STAGE}/budget_reduce/log.txt",
         cost=f"{STAGE}/budget_reduce/cost.json",
+    params:
+        *code("budget_reduce"),
+        settings=SETTINGS["budget_reduce"],
     shell:
         "{PYTHON:q} -m stages.budget_reduce --maps {input.textured:q} --casters {input.casters:q} --settings {params.settings:q}"
         " --out {output.textures:q} --table {output.table:q} --log {log.text:q} --cost {log.cost:q}"
@@ -259,12 +258,12 @@ rule lod_export:
         casters=rules.tessellate.output,
     output:
         f"{STAGE}/lod_export/lod_{{k}}.npz",
-    params:
-        *code("lod_export"),
-        levels=SETTINGS["lod_export"],
     log:
         text=f"{STAGE}/lod_export/log_{{k}}.txt",
         cost=f"{STAGE}/lod_export/cost_{{k}}.json",
+    params:
+        *code("lod_export"),
+        levels=SETTINGS["lod_export"],
     shell:
         "{PYTHON:q} -m stages.lod_export --scene {input.scene:q} --casters {input.casters:q} --levels {params.levels:q} --units m"
         " --level-index {wildcards.k} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
@@ -280,14 +279,14 @@ rule package:
         combined=f"{OUT}/scene.glb",
         levels=[f"{OUT}/scene_LOD{k}.{end}" for k in LEVELS for end in ("gltf", "bin")],
         manifest=f"{OUT}/lods.json",
+    log:
+        text=f"{STAGE}/package/log.txt",
+        cost=f"{STAGE}/package/cost.json",
     params:
         *code("package"),
         settings=SETTINGS["package"],
         materials=scene.slices["materials"],
         results=OUT,
-    log:
-        text=f"{STAGE}/package/log.txt",
-        cost=f"{STAGE}/package/cost.json",
     shell:
         "{PYTHON:q} -m stages.package --scene {input.scene:q} --casters {input.casters:q} --textures {input.textures:q}"
         " --lods {input.lods:q} --materials {params.materials:q} --settings {params.settings:q} --results {params.results:q}"
@@ -308,13 +307,13 @@ rule report:
     output:
         html=f"{OUT}/report.html",
         json=f"{OUT}/report.json",
+    log:
+        text=f"{STAGE}/report/log.txt",
+        cost=f"{STAGE}/report/cost.json",
     params:
         *code("report"),
         settings=SETTINGS["report"],
         results=OUT,
-    log:
-        text=f"{STAGE}/report/log.txt",
-        cost=f"{STAGE}/report/cost.json",
     shell:
         "{PYTHON:q} -m stages.report --results {params.results:q} --scene {input.scene:q} --casters {input.casters:q}"
         " --solution {input.solution:q} --direct {input.direct:q} --indirect {input.indirect:q} --maps {input.maps:q}"
