@@ -103,8 +103,20 @@ def _visible_share(x, N, shift, l, row, points, n0, walk, emitters, tracer, face
         )
         seen[again] += more[0]
         total[again] += more[1]
-    with np.errstate(invalid="ignore"):
-        return np.where(total > 0, seen / np.where(total > 0, total, 1.0), 0.0), partly
+    missed = np.flatnonzero(total <= 0)
+    if missed.size:
+        rest = row[missed], l[missed], walk, emitters, tracer, face_surface
+        seen[missed], total[missed] = _sees_highest_corner(x[missed], N[missed], *rest), 1.0
+    return seen / total, partly
+
+
+def _sees_highest_corner(x, N, row, l, walk, emitters, tracer, face_surface):
+    """1 or 0 for points with so little of their emitter above the horizon that none of the points on it was."""
+    facet = walk.choose(row, l, np.full((len(x), 1), 0.5))[0][:, 0]
+    corners = emitters.facets.corners()[facet] - x[:, None]
+    highest = np.einsum("kpc,kc->kp", corners, N).argmax(axis=1)
+    D = corners[np.arange(len(x)), highest].astype(np.float32)
+    return ~_is_blocked(np.ascontiguousarray(x, dtype=np.float32), D, l, emitters, tracer, face_surface)
 
 
 def _probe(x, N, shift, l, row, points, walk, emitters, tracer, face_surface):
@@ -131,14 +143,15 @@ def _probe(x, N, shift, l, row, points, walk, emitters, tracer, face_surface):
 
 
 def _is_blocked(origins, D, l, emitters, tracer, face_surface):
-    """A curved emitter's own mesh stands before its facets: meeting it first is seeing it."""
+    """A curved emitter's own mesh stands before its facets: meeting its lit side first is seeing it."""
     curved = emitters.is_curved[l]
-    if not curved.any():
+    if not curved.any() or not len(face_surface):
         return tracer.is_blocked(origins, D)
     blocked = np.zeros(len(D), dtype=bool)
     blocked[~curved] = tracer.is_blocked(origins[~curved], D[~curved])
-    face = tracer.closest(origins[curved], D[curved], reach=0.9995).face
-    blocked[curved] = (face >= 0) & (face_surface[face] != emitters.surface[l[curved]])
+    hits = tracer.closest(origins[curved], D[curved], reach=0.9995)
+    is_own = (face_surface[hits.face] == emitters.surface[l[curved]]) & ~hits.is_back
+    blocked[curved] = (hits.face >= 0) & ~is_own
     return blocked
 
 

@@ -140,11 +140,10 @@ def test_a_point_on_the_polygon_is_finite(place):
         assert 0 <= polygon(SQUARE, n, place) <= 1
 
 
-@pytest.mark.parametrize(
-    "facing, least, bound", [([0, 0, -1], FAR, 0.01), ([1, 0, 0], FAR, 0.016), ([1, 0, 0], 10, 0.01)]
-)
+@pytest.mark.parametrize("facing", [[0, 0, -1], [1, 0, 0]])
+@pytest.mark.parametrize("least, bound", [(FAR, 0.016), (10, 0.01)])
 def test_disc_is_the_polygon_from_afar(facing, least, bound):
-    """Facets that face the receiver are within 1 % from FAR on, standing ones within 1.6 %, and 1 % from 10 on."""
+    """In any direction, grazing ones too, within 1.6 % from FAR on and within 1 % from 10 on."""
     rng = np.random.default_rng(4)
     direction = rng.normal(size=(3000, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
