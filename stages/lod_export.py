@@ -48,6 +48,10 @@ def body(args, cost):
     note = ""
     if level.is_smallest:
         note = f"{level.asked} triangles asked for, these surfaces need {len(level.mesh.F)}"
+    elif "deviation" in asked and level.mesh.distance.max() > level.tolerance:
+        reached, wanted = level.mesh.distance.max() * shapes.scale, level.tolerance * shapes.scale
+        note = f"{wanted:.3g} m asked for, {reached:.3g} m reached"
+    if note:
         door.warn(f"lods[{k}]: {note}")
     lod_mesh.save(args.out, in_metres(level, shapes, np.asarray(x.flip, dtype=bool), k, asked, note))
     cost.notes.update(level=k, triangles=len(level.mesh.F), distance=float(level.mesh.distance.max()) * shapes.scale)

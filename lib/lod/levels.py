@@ -20,6 +20,7 @@ from lib.nurbs import lines as find_lines
 DEVIATION = 1e-4  # of the frame: the finest level, where none is named
 SLIDE = 8  # a texture may slide as many tolerances, or tessellate.SLIDE of the surface's size if that is more
 COARSEST, FINEST = 10.0, 1e-9  # tolerances searched, in frames
+LESSONS = 1  # times a level by count is cut again after measuring finer what came out far off
 MOST = 4_000_000  # triangles of one level
 
 
@@ -62,11 +63,11 @@ class Scene:
         """Allowed slide (n,) at a chord tolerance."""
         return np.maximum(SLIDE * tolerance, tessellate.SLIDE * self.size)
 
-    def predicted(self, tolerance):
+    def predicted(self, tolerance, plan=None):
         """Triangles a chord tolerance will cost, before measuring."""
+        plan = plan or self.plan
         both = np.stack([np.full(len(self.surfaces), tolerance), self.slide(tolerance)], axis=1)
-        count = find_lines.steps(self.plan, both)
-        return int(tessellate.n_triangles(self.plan, self.known, count).sum())
+        return int(tessellate.n_triangles(plan, self.known, find_lines.steps(plan, both)).sum())
 
     def by_deviation(self, tolerance):
         """The Level whose measured distance is at most `tolerance` (> 0)."""
@@ -78,19 +79,25 @@ class Scene:
     def by_count(self, asked):
         """The Level of at most `asked` triangles, or the smallest there is."""
         self._affordable(asked)
-        tolerance = self.tolerance_for(asked)
-        whole = np.full(len(self.surfaces), tolerance)
-        patches = tessellate.cut(self.surfaces, self.known, self.plan, whole, self.slide(tolerance))
+        plan = self.plan
+        for _ in range(1 + LESSONS):
+            tolerance = self.tolerance_for(asked, plan)
+            whole = np.full(len(self.surfaces), tolerance)
+            patches, placed = tessellate.cut(self.surfaces, self.known, plan, whole, self.slide(tolerance))
+            better = tessellate.learned(self.surfaces, self.known, plan, patches, placed, whole)
+            if better is None:
+                break
+            plan = better
         return self._level(patches, tolerance, asked, sum(len(p.F) for p in patches) > asked)
 
-    def tolerance_for(self, asked):
+    def tolerance_for(self, asked, plan=None):
         """The smallest tolerance found by bisection whose count is at most `asked`; the coarsest if none is."""
         low, high = np.log(FINEST), np.log(COARSEST)
-        if self.predicted(COARSEST) > asked:
+        if self.predicted(COARSEST, plan) > asked:
             return COARSEST
         for _ in range(40):
             middle = (low + high) / 2
-            if self.predicted(np.exp(middle)) <= asked:
+            if self.predicted(np.exp(middle), plan) <= asked:
                 high = middle
             else:
                 low = middle

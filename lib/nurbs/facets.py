@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lib.nurbs.evaluate import evaluate_grid
+from lib.nurbs.lines import unit
 
 STEPS = 4  # samples per cell and direction; quarters, because the middle of a coarse wave may lie on its chord
 FEW = 100  # cells; a surface cut into more is smooth inside them, and edge and facet middles show the distance
@@ -38,6 +39,32 @@ class Patch:
     square: float
     slide: float
     area: float
+
+
+def chord_errors(surface, u, v, is_closed, is_collapsed):
+    """Largest distance of the curves of a surface from their chords: along u, each step of u (m,), and along v (k,).
+
+    Inside the surface only what leaves it counts; on open sides all that leaves the chord.
+    """
+    S, S_u, S_v = evaluate_grid(surface, _finer(u, STEPS), _finer(v, STEPS))
+    normal = unit(np.cross(S_u, S_v))
+    is_open = [not (is_closed[k // 2] or is_collapsed[k]) for k in range(4)]
+    along_u = _chords(S, normal, is_open[2:])
+    return along_u, _chords(S.swapaxes(0, 1), normal.swapaxes(0, 1), is_open[:2])
+
+
+def _chords(S, normal, is_open):
+    """Largest error of each chord along the second axis of S (k, m STEPS + 1, 3): (m,)."""
+    start = S[:, :-1:STEPS, None]
+    along = np.diff(S[:, ::STEPS], axis=1)[:, :, None]
+    shape = (*along.shape[:2], STEPS, 3)
+    off = S[:, :-1].reshape(shape) - start
+    off = off - np.arange(STEPS)[:, None] / STEPS * along
+    height = np.abs((off * normal[:, :-1].reshape(shape)).sum(axis=3))
+    for end, whole in zip((0, -1), is_open, strict=True):
+        if whole:
+            height[end] = np.maximum(height[end], _from_chords(S[end], STEPS))
+    return height.max(axis=(0, 2))
 
 
 def _finer(lines, steps):
@@ -117,13 +144,16 @@ def _along_poles(below, area_below, above, area_above, is_collapsed):
 
 def _side_distance(fine, k, steps):
     """Largest distance of side k's samples from its edges."""
-    line = (fine[:, 0], fine[:, -1], fine[0], fine[-1])[k]
-    start, along = line[:-1:steps], np.diff(line[::steps], axis=0)
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    along = np.where(length > 0, along / np.maximum(length, 1e-300), 0.0)[:, None]
-    off = line[:-1].reshape(-1, steps, 3) - start[:, None]
-    off = off - np.einsum("ksc,ksc->ks", off, np.broadcast_to(along, off.shape))[..., None] * along
-    return float(np.linalg.norm(off, axis=2).max())
+    return float(_from_chords((fine[:, 0], fine[:, -1], fine[0], fine[-1])[k], steps).max())
+
+
+def _from_chords(line, steps):
+    """Distances (m, steps) of the samples of a line (m steps + 1, 3) from the chords over `steps` of them."""
+    along = np.diff(line[::steps], axis=0)[:, None]
+    off = line[:-1].reshape(-1, steps, 3) - line[:-1:steps, None]
+    square = np.maximum((along**2).sum(axis=2), 1e-300)
+    t = np.clip((off * along).sum(axis=2) / square, 0.0, 1.0)  # a hairpin leaves its short chord lengthways
+    return np.linalg.norm(off - t[..., None] * along, axis=2)
 
 
 def _mesh(S, u, v, is_falling, is_collapsed):

@@ -15,15 +15,17 @@ line set (`Links`). Lines also run along kinks, where the derivative jumps.  Par
 rounding noise does not reach them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from lib.nurbs.evaluate import evaluate_grid
 
 CELLS = 64  # steps along the direction measured
+LEAST_CELLS = 8  # steps between two kinks, however near
+FINER = 8  # steps put where the first were too coarse
+MOST_CELLS = 4096
 ACROSS = np.linspace(0.0, 1.0, 17)
-ALONG = np.linspace(0.0, 1.0, CELLS + 1)
 KINK = 1e-3  # jump of the derivative, relative to its size, that asks for a line
 MANY_KINKS = 16  # more than these are a polygon standing for a curve: they are treated as curvature
 TURN = np.deg2rad(125)  # one chord may stand for this much turning: a circle has at least 3
@@ -32,78 +34,115 @@ GRAIN = 2.0**24
 
 @dataclass(frozen=True)
 class Demand:
-    """What one surface asks for, in its own length unit.
+    """What one surface asks for, in its own length unit; the pairs are for the directions u and v.
 
-    root_K : (2, 2, 64)   [direction u, v; normal, tangential; step] sqrt(largest K across / 8)
-    twist : (2,)          [normal, tangential] largest |S_uv| / 4
-    kinks : two float arrays, interior parameters where S_u, S_v jump
-    least : (2,) int      fewest steps along u, v that keep the shape recognisable
+    at : pair of (m + 1,) ascending from 0 to 1, the steps K was measured on; kinks are among them
+    root_K : pair of (2, m)   [normal, tangential; step] sqrt(largest K across / 8)
+    twist : (2,)              [normal, tangential] largest |S_uv| / 4
+    kinks : pair of arrays, interior parameters where S_u, S_v jump: lines run there
+    least : (2,) int          fewest steps that keep the shape recognisable
+    forced : pair of arrays, interior parameters of more lines that must be there
     """
 
-    root_K: np.ndarray
+    at: tuple
+    root_K: tuple
     twist: np.ndarray
     kinks: tuple
     least: np.ndarray
+    forced: tuple = (np.empty(0), np.empty(0))
 
 
 def demand(surface, is_closed, is_collapsed):
     """Measure a surface; is_closed (2,), is_collapsed (4,) bool as lib.nurbs.shape says."""
     kinks = (_kinks(surface, 0), _kinks(surface, 1))
-    root_K, least = np.empty((2, 2, CELLS)), np.ones(2, dtype=np.int64)
-    for d in (0, 1):
-        S, along, across = _grid(surface, d)
-        border = [not (is_collapsed[2 * (1 - d) + end] or is_closed[1 - d]) for end in (0, 1)]
-        root_K[d] = _root_K(S, along, across, border, kinks[d])
-        least[d] = max(_turns(S), 3 if is_closed[d] else 2 if is_collapsed[2 * d : 2 * d + 2].all() else 1)
-    S, S_u, S_v = evaluate_grid(surface, ACROSS, ACROSS)
-    cross = S[1:, 1:] - S[1:, :-1] - S[:-1, 1:] + S[:-1, :-1]
-    S_uv = cross * (ACROSS.size - 1) ** 2
-    normal = _unit(np.cross(S_u, S_v))
-    normal = _unit(normal[1:, 1:] + normal[1:, :-1] + normal[:-1, 1:] + normal[:-1, :-1])
-    out = np.abs(np.einsum("jic,jic->ji", S_uv, normal))
-    inside = np.linalg.norm(S_uv - np.einsum("jic,jic->ji", S_uv, normal)[..., None] * normal, axis=2)
-    return Demand(root_K, np.array([out.max(), inside.max()]) / 4, kinks, least)
+    at = tuple(_along(k) for k in kinks)
+    found = [_measured(surface, d, at[d], kinks[d], is_closed, is_collapsed) for d in (0, 1)]
+    return Demand(at, tuple(f[0] for f in found), _twist(surface), kinks, np.array([f[1] for f in found]))
 
 
-def _grid(surface, d):
-    """Points and derivatives with the measured direction first: (65, 17, 3) each, S, along d, across d."""
+def refined(surface, demand, d, lines, failing, is_closed, is_collapsed):
+    """The Demand with direction d measured again, finer between those `lines` (k + 1,) where `failing` (k,)."""
+    t = np.arange(FINER) / FINER
+    finer = (lines[:-1, None] + np.diff(lines)[:, None] * t)[failing].ravel()
+    at = np.union1d(demand.at[d], finer)
+    at = at[np.concatenate([[True], np.diff(at) > 1e-9])]
+    if at.size > MOST_CELLS:
+        return demand
+    root_K, _ = _measured(surface, d, at, demand.kinks[d], is_closed, is_collapsed)
+    both = [(at, root_K) if k == d else (demand.at[k], demand.root_K[k]) for k in (0, 1)]
+    return replace(demand, at=tuple(b[0] for b in both), root_K=tuple(b[1] for b in both))
+
+
+def with_lines(demand, d, lines):
+    """The Demand with more lines (k,) along direction d."""
+    forced = tuple(np.union1d(own, lines) if k == d else own for k, own in enumerate(demand.forced))
+    return replace(demand, forced=forced)
+
+
+def _measured(surface, d, at, kinks, is_closed, is_collapsed):
+    """(root_K, least) of direction d on the steps `at`."""
+    S, along, across = _grid(surface, d, at)
+    border = [not (is_collapsed[2 * (1 - d) + end] or is_closed[1 - d]) for end in (0, 1)]
+    root_K = _root_K(S, along, across, border, at, np.isin(at, kinks))
+    return root_K, max(_turns(S), 3 if is_closed[d] else 2 if is_collapsed[2 * d : 2 * d + 2].all() else 1)
+
+
+def _along(kinks):
+    """Parameters to measure at: equal steps between kinks."""
+    edge = np.concatenate([[0.0], kinks, [1.0]])
+    count = np.maximum(np.rint(np.diff(edge) * CELLS), LEAST_CELLS).astype(int)
+    parts = [a + (b - a) * np.arange(n) / n for a, b, n in zip(edge[:-1], edge[1:], count, strict=True)]
+    return np.concatenate([*parts, [1.0]])
+
+
+def _grid(surface, d, along):
+    """Points and derivatives with the measured direction first: (m + 1, 17, 3) each, S, along d, across d."""
     if d == 0:
-        S, S_u, S_v = (a.swapaxes(0, 1) for a in evaluate_grid(surface, ALONG, ACROSS))
+        S, S_u, S_v = (a.swapaxes(0, 1) for a in evaluate_grid(surface, along, ACROSS))
         return S, S_u, S_v
-    S, S_u, S_v = evaluate_grid(surface, ACROSS, ALONG)
+    S, S_u, S_v = evaluate_grid(surface, ACROSS, along)
     return S, S_v, S_u
 
 
-def _unit(a):
+def _twist(surface):
+    """Largest |S_uv| / 4, normal and tangential (2,), from mixed differences."""
+    S, S_u, S_v = evaluate_grid(surface, ACROSS, ACROSS)
+    S_uv = (S[1:, 1:] - S[1:, :-1] - S[:-1, 1:] + S[:-1, :-1]) * (ACROSS.size - 1) ** 2
+    normal = unit(np.cross(S_u, S_v))
+    normal = unit(normal[1:, 1:] + normal[1:, :-1] + normal[:-1, 1:] + normal[:-1, :-1])
+    out = np.einsum("jic,jic->ji", S_uv, normal)
+    inside = np.linalg.norm(S_uv - out[..., None] * normal, axis=2)
+    return np.array([np.abs(out).max(), inside.max()]) / 4
+
+
+def unit(a):
     """Unit vectors, zero where the length is nothing beside the largest."""
     length = np.linalg.norm(a, axis=-1, keepdims=True)
     return np.where(length > 1e-9 * length.max(initial=0.0), a / np.maximum(length, 1e-300), 0.0)
 
 
-def _root_K(S, along, across, border, kinks):
-    """sqrt(K / 8) per step, normal and tangential (2, 64): second differences of S (65, 17, 3) along its first axis."""
-    second = (S[:-2] - 2 * S[1:-1] + S[2:]) * CELLS**2
-    normal = _unit(np.cross(along, across))[1:-1]
+def _root_K(S, along, across, border, at, is_kink):
+    """sqrt(K / 8) per step, normal and tangential (2, m): differences of S (m + 1, 17, 3) along its first axis."""
+    step = np.diff(at)[:, None, None]
+    slope = np.diff(S, axis=0) / step
+    second = 2 * np.diff(slope, axis=0) / (step[1:] + step[:-1])
+    normal = unit(np.cross(along, across))[1:-1]
     out = np.abs(np.einsum("kic,kic->ki", second, normal))
+    inside = np.linalg.norm(second - np.einsum("kic,kic->ki", second, normal)[..., None] * normal, axis=2)
     no_normal = ~normal.any(axis=2)
     out[no_normal] = np.linalg.norm(second, axis=2)[no_normal]
-    inside = np.linalg.norm(second - np.einsum("kic,kic->ki", second, normal)[..., None] * normal, axis=2)
-    tangent = _unit(along)[1:-1]
+    tangent = unit(along)[1:-1]
     for end, is_border in zip((0, -1), border, strict=True):
         if is_border:  # the outline is geometry too: what leaves the side's own tangent counts in full
             bend = second[:, end] - np.einsum("kc,kc->k", second[:, end], tangent[:, end])[:, None] * tangent[:, end]
             out[:, end] = np.linalg.norm(bend, axis=1)
-    noise = 64 * np.finfo(float).eps * np.abs(S).max() * CELLS**2
+    noise = 64 * np.finfo(float).eps * np.abs(S).max() / step[1:, 0, 0] ** 2
     K = np.stack([out.max(axis=1), inside.max(axis=1)])
-    K = np.where(K > noise, K, 0.0)
-    smooth = np.ones(CELLS - 1, dtype=bool)
-    for kink in kinks:
-        smooth &= np.abs(ALONG[1:-1] - kink) >= 1 / CELLS
-    if not smooth.all() and smooth.any():  # a difference across a kink is no curvature: take the neighbours'
-        K = np.stack([np.interp(ALONG[1:-1], ALONG[1:-1][smooth], k[smooth]) for k in K])
-    root = np.sqrt(K / 8)
-    root = np.concatenate([root[:, :1], root, root[:, -1:]], axis=1)
-    return (root[:, :-1] + root[:, 1:]) / 2
+    root = np.sqrt(np.where(K > noise, K, 0.0) / 8)
+    # a difference across a kink is no curvature, and at the ends there is none: their steps take the other end's
+    root = np.concatenate([np.zeros((2, 1)), np.where(is_kink[1:-1], 0.0, root), np.zeros((2, 1))], axis=1)
+    known = np.concatenate([[0], ~is_kink[1:-1], [0]])
+    return (root[:, :-1] + root[:, 1:]) / (known[:-1] + known[1:])
 
 
 def _kinks(surface, d):
@@ -124,11 +163,11 @@ def _kinks(surface, d):
 
 
 def _turns(S):
-    """Fewest steps by the turning of the curves S (65, 17, 3) along the first axis: 1 to 3."""
+    """Fewest steps by the turning of the curves S (m + 1, 17, 3) along the first axis: 1 to 3."""
     chord = np.diff(S, axis=0)
     length = np.linalg.norm(chord, axis=2)
     rows = length.sum(axis=0) > 1e-6 * length.sum(axis=0).max(initial=0.0)
-    t = _unit(chord[:, rows])
+    t = unit(chord[:, rows])
     cosine = np.clip(np.einsum("kic,kic->ki", t[1:], t[:-1]), -1, 1)
     angle = np.where(t[1:].any(axis=2) & t[:-1].any(axis=2), np.arccos(cosine), 0.0)
     return int(np.clip(np.ceil(angle.sum(axis=0).max(initial=0.0) / TURN - 1e-6), 1, 3))
@@ -211,8 +250,8 @@ def plan(demands, link):
         bounds.append(edge)
         first.append(total)
         for m in members:
-            summed = _cumulative(_oriented(demands, link, m))
-            part = np.diff(np.stack([np.interp(edge, ALONG, row) for row in summed]), axis=1)
+            at, root_K = _oriented(demands, link, m)
+            part = np.diff(np.stack([np.interp(edge, at, row) for row in _cumulative(at, root_K)]), axis=1)
             node += [m] * (edge.size - 1)
             segment += range(total, total + edge.size - 1)
             square.append(part.T**2)
@@ -233,7 +272,7 @@ def plan(demands, link):
 def _bounds(demands, link, members, is_mirrored):
     kinks = [np.array([0.0, 1.0])]
     for m in members:
-        own = demands[m // 2].kinks[m % 2]
+        own = np.union1d(demands[m // 2].kinks[m % 2], demands[m // 2].forced[m % 2])
         kinks.append(1 - own if link.is_reversed[m] else own)
         kinks.append(1 - own if is_mirrored else own[:0])
     edge = np.unique(np.concatenate(kinks))
@@ -241,13 +280,14 @@ def _bounds(demands, link, members, is_mirrored):
 
 
 def _oriented(demands, link, node):
-    root_K = demands[node // 2].root_K[node % 2]
-    return root_K[:, ::-1] if link.is_reversed[node] else root_K
+    """A node's steps (m + 1,) and sqrt(K / 8) (2, m) along its set's direction."""
+    at, root_K = demands[node // 2].at[node % 2], demands[node // 2].root_K[node % 2]
+    return (1 - at[::-1], root_K[:, ::-1]) if link.is_reversed[node] else (at, root_K)
 
 
-def _cumulative(density):
-    """Integral from 0 at the 65 grid parameters, of a density (..., 64) constant over each step."""
-    return np.concatenate([np.zeros((*density.shape[:-1], 1)), np.cumsum(density, axis=-1) / CELLS], axis=-1)
+def _cumulative(at, density):
+    """Integral from 0 to each of `at` (m + 1,), of a density (..., m) constant between them."""
+    return np.concatenate([np.zeros((*density.shape[:-1], 1)), np.cumsum(density * np.diff(at), axis=-1)], axis=-1)
 
 
 def _shares(p, tolerance):
@@ -294,12 +334,13 @@ def place(p, tolerance, count):
     starts = np.searchsorted(p.links.group[nodes], np.arange(len(p.bounds) + 1))
     for g, edge in enumerate(p.bounds):
         own = count[p.first[g] : p.first[g] + edge.size - 1]
-        density = np.zeros(CELLS)
-        if own.max() > 1:
-            for m in nodes[starts[g] : starts[g + 1]]:
-                root = np.sqrt(_oriented(p.demands, p.links, m) ** 2 + added[m][:, None]) / scale[m][:, None]
-                density = np.maximum(density, root.max(axis=0))
-        sets.append(_place(density, edge, own, p.links.is_mirrored[g]))
+        wanted = []
+        for m in nodes[starts[g] : starts[g + 1]] if own.max() > 1 else ():
+            at, root_K = _oriented(p.demands, p.links, m)
+            wanted.append((at, (np.sqrt(root_K**2 + added[m][:, None]) / scale[m][:, None]).max(axis=0)))
+        if p.links.is_mirrored[g]:
+            wanted += [(1 - at[::-1], density[::-1]) for at, density in wanted]
+        sets.append(_place(wanted, edge, own, p.links.is_mirrored[g]))
     out = []
     for s in range(len(p.demands)):
         own = [sets[p.links.group[m]] for m in (2 * s, 2 * s + 1)]
@@ -307,19 +348,21 @@ def place(p, tolerance, count):
     return out
 
 
-def _place(density, edge, count, is_mirrored):
-    """Lines of one set: `count` (k,) steps of equal integral of `density` (64,) between the `edge` parameters."""
+def _place(wanted, edge, count, is_mirrored):
+    """Lines of one set: `count` (k,) steps between the `edge` parameters (k + 1,), each of equal integral of the
+    largest of the densities `wanted`, pairs of `at` (m + 1,) and (m,).
+    """
+    at = np.unique(np.concatenate([edge, *(a for a, _ in wanted)]))
+    middle = (at[:-1] + at[1:]) / 2
+    density = np.max([d[np.searchsorted(a, middle) - 1] for a, d in wanted] or [np.ones(middle.size)], axis=0)
     density = density + max(0.05 * density.max(), 1e-30)  # never a step without end where the surface is straight
-    if is_mirrored:
-        density = (density + density[::-1]) / 2
-    summed = _cumulative(density)
-    at = np.interp(edge, ALONG, summed)
+    summed = _cumulative(at, density)
+    own = np.interp(edge, at, summed)
     inner = [
-        np.interp(a + (b - a) * np.arange(1, n) / n, summed, ALONG)
-        for a, b, n in zip(at[:-1], at[1:], count, strict=True)
+        np.interp(a + (b - a) * np.arange(1, n) / n, summed, at) for a, b, n in zip(own, own[1:], count, strict=False)
     ]
     lines = np.concatenate(
-        [np.concatenate([[start], np.rint(t * GRAIN) / GRAIN]) for start, t in zip(edge, inner, strict=False)]
+        [np.concatenate([[a], np.rint(t * GRAIN) / GRAIN]) for a, t in zip(edge, inner, strict=False)]
     )
     lines = np.unique(np.append(lines, 1.0))
     return (lines + (1 - lines[::-1])) / 2 if is_mirrored else lines

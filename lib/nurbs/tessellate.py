@@ -5,7 +5,7 @@ equal speed, along seams and at poles the vertices of all sides take the positio
 nothing can slip through.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,11 +13,15 @@ from lib.nurbs import borders as find_borders
 from lib.nurbs import lines as find_lines
 from lib.nurbs import shape
 from lib.nurbs.evaluate import evaluate_grid
-from lib.nurbs.facets import has_area, triangulate
+from lib.nurbs.facets import chord_errors, has_area, triangulate
 
 NINE = np.linspace(0.0, 1.0, 9)
 SLIDE = 0.01  # share of its size by which a texture may slide on a surface
-ROUNDS = 8  # of measuring and cutting finer
+ROUNDS = 16  # of measuring and cutting finer
+PATIENCE = 2  # of these before single chords are halved
+FEW = 4  # single: one chord in so many, or two
+MORE = 1.03  # asked for, so that the next attempt does not fail by a hair
+FAR_OFF = 1.3  # times the tolerance: worth measuring finer where a count is asked for and no distance
 
 
 @dataclass(frozen=True)
@@ -98,9 +102,9 @@ def plan(surfaces, known, lattice=None):
     demands = [
         find_lines.demand(s, c, p) for s, c, p in zip(surfaces, known.is_closed, known.is_collapsed, strict=True)
     ]
-    for s, forced in (lattice or {}).items():
-        kinks = tuple(np.union1d(own, more) for own, more in zip(demands[s].kinks, forced, strict=True))
-        demands[s] = replace(demands[s], kinks=kinks)
+    for s, along in (lattice or {}).items():
+        for d in (0, 1):
+            demands[s] = find_lines.with_lines(demands[s], d, along[d])
     return find_lines.plan(demands, find_lines.links(len(surfaces), known.borders))
 
 
@@ -112,22 +116,30 @@ def n_triangles(p, known, count):
 
 
 def cut(surfaces, known, p, tolerance, slide):
-    """A list of Patch: all surfaces cut for tolerance (n,) and slide (n,) as planned, not measured against them."""
+    """Cut all surfaces for tolerance (n,) and slide (n,) as planned: (list of Patch, their lines (u, v))."""
     both = np.stack([tolerance, slide], axis=1)
     placed = find_lines.place(p, both, find_lines.steps(p, both))
-    return [
-        triangulate(*each)
-        for each in zip(surfaces, *zip(*placed, strict=True), known.is_closed, known.is_collapsed, strict=True)
-    ]
+    each = zip(surfaces, *zip(*placed, strict=True), known.is_closed, known.is_collapsed, strict=True)
+    return [triangulate(*one) for one in each], placed
+
+
+def learned(surfaces, known, p, patches, placed, tolerance):
+    """The plan measured finer where `patches`, cut along `placed`, miss tolerance (n,) by far; None if nowhere."""
+    demands, over = list(p.demands), np.flatnonzero([q.distance for q in patches] > FAR_OFF * tolerance)
+    for s in over:
+        own = (surfaces[s], known.is_closed[s], known.is_collapsed[s])
+        demands[s], _ = _amended(demands[s], *own, placed[s], patches[s].distance, tolerance[s], 0)
+    return find_lines.plan(demands, p.links) if over.size else None
 
 
 def cut_within(surfaces, known, p, tolerance, slide):
-    """A list of Patch: cut until the measured distance stays within tolerance (n,), asking for more where it does not.
+    """A list of Patch: cut until the measured distance stays within tolerance (n,).
 
-    Gives up after ROUNDS; the patches say what was reached.
+    Where it does not, a little more is asked for and the plan is amended (`_amended`).  Gives up after ROUNDS; the
+    patches say what was reached.
     """
     ask, patches, before = tolerance.copy(), [None] * len(surfaces), None
-    for _ in range(ROUNDS):
+    for attempt in range(ROUNDS):
         both = np.stack([ask, slide], axis=1)
         placed = find_lines.place(p, both, find_lines.steps(p, both))
         for s, (u, v) in enumerate(placed):
@@ -135,11 +147,37 @@ def cut_within(surfaces, known, p, tolerance, slide):
                 patches[s] = triangulate(surfaces[s], u, v, known.is_closed[s], known.is_collapsed[s])
         before = placed
         distance = np.array([p.distance for p in patches])
-        over = (distance > tolerance) & ~(known.is_planar & (distance <= 1e-7))
-        if not over.any():
+        over = np.flatnonzero((distance > tolerance) & ~(known.is_planar & (distance <= 1e-7)))
+        if not over.size:
             break
-        ask[over] *= np.minimum(tolerance[over] / distance[over], 1) / 1.03
+        demands = list(p.demands)
+        for s in over:
+            own = (surfaces[s], known.is_closed[s], known.is_collapsed[s])
+            demands[s], share = _amended(demands[s], *own, placed[s], distance[s], tolerance[s], attempt)
+            ask[s] *= share
+        p = find_lines.plan(demands, p.links)
     return patches
+
+
+def _amended(demand, surface, is_closed, is_collapsed, placed, distance, tolerance, attempt):
+    """A Demand that fails with the lines `placed` (u, v), amended, and the share of the tolerance to ask for next.
+
+    Chords that fail show where: there the surface is measured finer.  If that did not help, few failing ones are
+    halved, for a bend much shorter than the chord; if many fail, or none explains the distance (then it is the twist),
+    a smaller tolerance is asked for.
+    """
+    errors = chord_errors(surface, *placed, is_closed, is_collapsed)
+    is_everywhere = errors[0].max() + errors[1].max() < distance / 2
+    for d in (0, 1):
+        failing = errors[d] > tolerance / 2
+        if failing.any():
+            demand = find_lines.refined(surface, demand, d, placed[d], failing, is_closed, is_collapsed)
+        if attempt >= PATIENCE and failing.any():
+            if failing.sum() <= max(2, failing.size // FEW):
+                demand = find_lines.with_lines(demand, d, ((placed[d][1:] + placed[d][:-1]) / 2)[failing])
+            else:
+                is_everywhere = True
+    return demand, (tolerance / distance if is_everywhere else 1.0) / MORE
 
 
 def assemble(patches, known):

@@ -2,6 +2,7 @@
 
 import json
 import struct
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -101,11 +102,19 @@ def test_levels_share_materials_in_the_combined_file(tmp_path, ramp):
     assert len(exported.load(tmp_path / "scene.glb")[0]) == 1  # a viewer without the extension draws one level
 
 
-def test_accessors_are_aligned_and_bounded(tmp_path, ramp):
+@pytest.mark.parametrize("kind", ["gltf", "glb"])
+def test_accessors_are_aligned_and_bounded(tmp_path, ramp, kind):
     odd = Piece("odd", 0, SQUARE[:3], UP[:3], F[:1], SQUARE[:3, :2])
-    write_level(tmp_path / "a.gltf", [odd, wall()], [ramp], np.zeros(3), EXTRAS)
-    document = json.loads((tmp_path / "a.gltf").read_text())
-    blob = (tmp_path / "a.bin").read_bytes()
+    path = tmp_path / f"a.{kind}"
+    if kind == "gltf":
+        write_level(path, [odd, wall()], [ramp], np.zeros(3), EXTRAS)
+        document, blob = json.loads(path.read_text()), (tmp_path / "a.bin").read_bytes()
+    else:  # the picture's bytes come first, one too many
+        write_combined(path, [[odd, wall()]], [replace(ramp, png=ramp.png + b"!")], [0.0], np.zeros(3), EXTRAS)
+        data = path.read_bytes()
+        n = struct.unpack_from("<I", data, 12)[0]
+        document, blob = json.loads(data[20 : 20 + n]), data[28 + n :]
+        assert len(ramp.png + b"!") % 4 or len(ramp.png) % 4
     size = {5123: 2, 5125: 4, 5126: 4}
     for accessor in document["accessors"]:
         view = document["bufferViews"][accessor["bufferView"]]

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lib.nurbs import evaluate, lines, tessellate
+from lib.nurbs import evaluate, facets, lines, tessellate
 from lib.nurbs.surface import NurbsSurface, bezier, from_points
 from tests.shapes import box, cylinder, disc, extruded, rectangle, revolved, sphere, triangle
 
@@ -225,3 +225,73 @@ def test_opposite_corner_poles_leave_no_flat_triangle():
     mesh, known = mesh_of([bezier(P)], 1e-3)
     assert known.is_collapsed.tolist() == [[True, False, True, False]]
     assert (np.linalg.norm(face_normals(mesh), axis=1) > 0).all()
+
+
+def test_the_diagonal_follows_the_saddle():
+    """One cell of (x + y)^2 is cut along x + y = 1, where it is constant, and one of (x - y)^2 along x = y."""
+    x, square = np.array([0, 0.5, 1]), np.array([0.0, 0.0, 1.0])  # control values of t and t^2
+    for sign, ends in ((1, [1.0, 1.0]), (-1, [0.0, 2.0])):
+        z = square[:, None] + square[None] + 2 * sign * np.outer(x, x)
+        P = np.stack(np.broadcast_arrays(x[:, None], x[None], z), axis=-1)
+        corners = np.array([0.0, 1.0])
+        patch = facets.triangulate(bezier(P), corners, corners, (False, False), (False,) * 4)
+        shared = [i for i in range(4) if (patch.F == i).sum() == 2]
+        assert patch.UV[shared].sum(axis=1).tolist() == ends
+
+
+def test_a_sharp_bend_between_near_kinks_is_seen():
+    """A tube's lip: 2 % of the parameter turn by half a circle between two kinks, far below the steps of measuring."""
+    w = np.sqrt(0.5)
+    P = [[0, 0], [0.5, 0], [1, 0], [1.05, 0], [1.05, 0.05], [1.05, 0.1], [1, 0.1], [0.5, 0.1], [0, 0.1]]
+    knots = [0, 0, 0, 0.49, 0.49, 0.5, 0.5, 0.51, 0.51, 1, 1, 1]
+    net = np.zeros((9, 2, 3))
+    net[:, :, :2] = np.array(P)[:, None]
+    net[:, 1, 2] = 1
+    weights = np.array([1, 1, 1, w, 1, w, 1, 1, 1])[:, None].repeat(2, axis=1)
+    surface = from_points(2, 1, knots, [0, 0, 1, 1], net, weights)
+    mesh, _ = mesh_of([surface], 1e-4)
+    u = np.unique(mesh.UV[:, 0])
+    assert mesh.distance[0] <= 1e-4
+    bend = np.pi / (2 * np.arccos(1 - 1e-4 / 0.05))
+    assert bend <= len(u[(u >= 0.49) & (u <= 0.51)]) - 1 <= 2 * bend
+    assert len(u) < 2 * bend + 6  # and the straight parts take next to nothing
+
+
+def test_a_bump_far_finer_than_the_measuring_is_found_by_the_chords():
+    """A fold over 1 % of the parameter, smooth: the plan's second differences hardly see it, the measured chords do."""
+    x = np.linspace(0, 1, 301)
+    surface = extruded(np.stack([x, 0.03 * np.exp(-(((x - 0.503) / 0.004) ** 2))], axis=1), 1.0, degree=2)
+    mesh, _ = mesh_of([surface], 1e-3)
+    assert mesh.distance[0] <= 1e-3
+    S = evaluate.point(surface, np.linspace(0, 1, 4001), np.zeros(4001))
+    _, first = np.unique(mesh.UV[:, 0], return_index=True)
+    height = np.interp(S[:, 0], mesh.V[first, 0], mesh.V[first, 1])
+    assert np.abs(height - S[:, 1]).max() < 0.03 * 0.4  # along y; across the steep flanks it is a tenth of that
+    assert len(first) < 60
+
+
+def test_an_outline_that_turns_back_on_itself_is_measured_lengthways():
+    """A tongue: both long sides of the sheet run out and come back to nearly where they began."""
+    t = np.array([[0, 0], [2, 0.0], [2, 0.02], [0.01, 0.02]])
+    P = np.zeros((4, 2, 3))
+    P[:, :, :2] = t[:, None]
+    P[:, 1, 2] = 0.5
+    patch = facets.triangulate(bezier(P), np.array([0.0, 1.0]), np.array([0.0, 1.0]), (False, False), (False,) * 4)
+    assert patch.distance > 1.4
+
+
+@pytest.mark.parametrize("is_kinked", [False, True])
+def test_a_reversed_neighbour_gets_the_mirrored_lines(is_kinked):
+    """An uneven curve (or a bent one) with a sheet on either side, the second running backwards along it."""
+    angle = np.linspace(0, 1, 17) ** 2 * np.pi / 2
+    curve = [[0, 0], [1, 0], [1, 2]] if is_kinked else np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    knots, degree = ([0, 0, 0.3, 1, 1], 1) if is_kinked else (None, 3)
+    below = extruded(curve, -1.0, knots, degree)
+    back = knots if knots is None else 1 - np.array(knots[::-1])
+    above = extruded(np.array(curve)[::-1], 1.0, back, degree)
+    alone, _ = mesh_of([below], 1e-3)
+    both, known = mesh_of([above, below], 1e-3)
+    assert known.borders.tolist() == [[0, 2, 1, 2, 1]]
+    own = both.UV[both.vertex_start[1] :]
+    assert np.unique(own[:, 0]) == pytest.approx(np.unique(alone.UV[:, 0]), abs=1e-3)
+    assert both.distance.max() <= 1e-3

@@ -48,6 +48,8 @@ def test_a_level_is_in_metres_and_faces_the_lit_side(files):
     centre = np.array([1.0, 1.0, 3.2])
     out = level.V[own] - centre
     assert np.linalg.norm(out, axis=1) == pytest.approx(0.6, rel=1e-9)
+    # a sphere's facets lie evenly below it: 0 at the vertices, most in their middles
+    assert 0.3 * level.distance[0] < level.rms[0] < 0.8 * level.distance[0] and level.distance[0] < level.slide[0] < 0.5
     assert np.allclose(level.N[own], -out / 0.6, atol=1e-6)  # flipped: the ball is lit from inside
     F = level.F[: level.face_start[1]]
     A, B, C = (level.V[F[:, k]] for k in range(3))

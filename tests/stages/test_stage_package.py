@@ -20,15 +20,15 @@ def maps_of(x):
     """Constant light on the box, a ramp on the picture, a lamp of constant light as box/6; the ball has no map."""
     light = []
     for s in range(1, 8):
-        w = h = 5
+        w, h = (9 if s == 7 else 5), 5
         v, u = np.meshgrid(np.linspace(0, 1, h), np.linspace(0, 1, w), indexing="ij")
         light.append(np.stack([u, v, 0 * u], axis=2) if s == 7 else np.full((h, w, 3), 0.4))
     light[5] = 0 * light[5]
-    hidden = [np.zeros((5, 5), bool) for _ in light]
+    hidden = [np.zeros(a.shape[:2], bool) for a in light]
     hidden[0][2:, 2:] = True  # box/1 partly buried: its dark texels may not show
     light[0] = light[0] * np.linspace(1, 2, 5)[None, :, None]
     light[0][hidden[0]] = 0
-    packed = mapset.pack(np.arange(1, 8), [[1, 1]] * 7, [2] * 7, light, hidden)
+    packed = mapset.pack(np.arange(1, 8), [[1, 1]] * 6 + [[2, 1]], [2] * 7, light, hidden)
     rho = np.full((7, 3), 0.5)
     return textured_maps.TexturedMaps(x.names[1:], packed, packed, x.E[1:], rho, np.zeros(7, bool))
 
@@ -81,8 +81,12 @@ def test_colours(files):
     assert by_name["box/2"].texture == -1 and np.allclose(by_name["box/2"].factor, even)
     assert np.allclose(by_name["box/6"].factor, np.minimum(np.array([30, 20, 10]) / np.pi * 2, 1))  # the lamp glows
     picture = np.asarray(textures[by_name["picture"].texture].rgb, float)
-    assert picture.shape == (5, 5, 3)
-    v, u = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 5), indexing="ij")
+    assert picture.shape == (5, 9, 3)
+    v, u = np.meshgrid(np.linspace(0, 1, 5), np.linspace(0, 1, 9), indexing="ij")
+    st = by_name["picture"].ST
+    assert sorted(set(st[:, 0])) == pytest.approx([0.5 / 9, 8.5 / 9]) and sorted(set(st[:, 1])) == pytest.approx(
+        [0.1, 0.9]
+    )
     assert np.abs(picture[..., 0] - u / np.pi * 2).max() < 6e-3 and np.abs(picture[..., 1] - v / np.pi * 2).max() < 6e-3
 
 
@@ -137,10 +141,10 @@ def test_gouraud_puts_the_map_into_vertices_on_its_lattice(files):
     assert [p.name for p in (results / "textures").iterdir()] == ["001-s.png"]
     for k in (0, 1):
         [part] = [p for p in exported.load(results / f"scene_LOD{k}.gltf")[0] if p.name == "picture"]
-        assert part.texture == -1 and part.ST is None and len(part.V) == 25 and len(part.F) == 32
+        assert part.texture == -1 and part.ST is None and len(part.V) == 45 and len(part.F) == 64
         u, v = part.V[:, 0], part.V[:, 1]  # the picture stands in the plane of x and, y up, y
-        w = np.rint(u * 4).astype(int), np.rint(v * 4).astype(int)
-        assert np.allclose(part.colour, maps.final.map(6)[w[1], w[0]] / np.pi * 2, atol=1e-6)
+        i, j = np.rint(u * 8).astype(int), np.rint(v * 4).astype(int)
+        assert np.allclose(part.colour, maps.final.map(6)[j, i] / np.pi * 2, atol=1e-6)
 
 
 def test_auto_uses_vertices_only_where_nothing_shows(files):

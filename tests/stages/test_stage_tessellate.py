@@ -7,7 +7,7 @@ from lib.formats import casters, scene
 from lib.formats.artefact import ArtefactError, read_json
 from lib.nurbs.shape import transformed
 from stages import tessellate
-from tests.shapes import box, rectangle, sphere
+from tests.shapes import box, disc, rectangle, sphere
 
 
 def small_scene(scale=1.0, flip=()):
@@ -64,6 +64,14 @@ def test_the_contract_holds(tmp_path):
     notes = read_json(tmp_path / "cost.json")["notes"]
     assert notes["triangles"] == len(x.F) and notes["shells"] == 2
     assert read_json(tmp_path / "cost.json")["rays"] == 0
+
+
+def test_flat_surfaces_have_no_sag_though_their_outline_is_cut(tmp_path):
+    x = small_scene()
+    x.surfaces[1] = disc()
+    _, path = run(tmp_path, x)
+    made = casters.load(path)
+    assert made.is_planar[1] and made.sag[1] == 0 and (made.face_surface == 1).sum() > 20
 
 
 def test_flip_turns_the_faces(tmp_path):
