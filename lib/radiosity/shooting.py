@@ -22,6 +22,7 @@ BRIGHT = 0.1  # elements with this share of the largest unshot power shoot in th
 OVERSHOOT = 0.5  # c: halves the shots against 0; 1 is worse
 MOST_GAIN = 100.0  # bound of 1 / (1 - rho_avg)
 MOST_ROUNDS, MOST_SWEEPS = 5000, 20000
+LEAST_SWEEPS = 6  # before the ratio of two changes tells how light dies
 STAGNANT = 100  # rounds without a hundredth of progress: the light does not die out
 
 
@@ -44,7 +45,7 @@ class Solution:
 
 
 class FormFactors:
-    """The sparse matrix F of rows with entries; n_nothing, n_absorbed the shares that meet no element, (n,)."""
+    """The sparse matrix F of rows with entries; escaped, absorbed (n,) the shares that meet no element, met (n,) others."""
 
     def __init__(self, entries):
         n, R = entries.shape
@@ -57,6 +58,7 @@ class FormFactors:
         self._F = count / rays[self._row]
         self.escaped = (entries == -1).sum(axis=1) / rays
         self.absorbed = (entries == -2).sum(axis=1) / rays
+        self.met = 1 - self.escaped - self.absorbed
 
     def gather(self, B):
         """sum_j F_ij B_j for B (n, C): (n, C)."""
@@ -95,7 +97,7 @@ def solve(H_direct, rho, area, F, residual=1e-3, bounces=None):
         return _reflect(flat, rho_flat, area, F, bounces, G)
     H, dB, history, ledger, shots = _shoot(flat, rho_flat, area, F, residual)
     ambient = _ambient(dB, rho_flat, area, F)
-    H, sweeps = _sweep(flat, H, rho_flat, F, residual)
+    H, sweeps = _sweep(flat, H, rho_flat, area, F, residual)
     gathered, shot = (rho_flat * H * area[:, None]).sum(axis=0), ledger.pop("reflected")
     ledger["residue"] = gathered - shot
     ledger = {name: value.reshape(G, 3) for name, value in ledger.items()}
@@ -166,23 +168,41 @@ def _shoot(H_direct, rho, area, F, residual):
 def _ambient(dB, rho, area, F):
     """Irradiance the unshot light will still bring, on the mean over the elements, (C,)."""
     total = max(area.sum(), 1e-300)
-    rho_avg = (rho * area[:, None]).sum(axis=0) / total
-    met = ((1 - F.escaped - F.absorbed) * area).sum() / total
-    return met / np.maximum(1 - met * rho_avg, 1 / MOST_GAIN) * (dB * area[:, None]).sum(axis=0) / total
+    met = (F.met * area).sum() / total
+    return met / np.maximum(1 - _round_trip(rho, area, F), 1 / MOST_GAIN) * (dB * area[:, None]).sum(axis=0) / total
 
 
-def _sweep(H_direct, H, rho, F, residual):
-    """Gather until the change, summed as a geometric series, is below `residual` of the mean."""
-    previous = None
+def _round_trip(rho, area, F):
+    """Share of light that is still there after one more bounce, on the mean over the elements, (C,)."""
+    total = max(area.sum(), 1e-300)
+    return (F.met * area).sum() / total * (rho * area[:, None]).sum(axis=0) / total
+
+
+def _sweep(H_direct, H, rho, area, F, residual):
+    """Gather until what is to come, summed as a geometric series, is below `residual` of the mean.
+
+    The first changes are the noise of shooting, gone after a few sweeps; light that goes round a room dies slowest, by
+    about the mean reflectance a sweep.  So the series is summed with the slowest of that ratio, the last one seen and
+    the one it rises to.  Each sweep also adds the even light that takes most from the changes to come (least squares):
+    where they end stays the same.
+    """
+    column = area[:, None]
+    lost = 1 - F.gather(rho)  # of an even light of 1, by one sweep
+    weight = np.maximum((column * lost * lost).sum(axis=0), 1e-300)
+    slow = float(_round_trip(rho, area, F).max(initial=0.0))
+    change = H_direct + F.gather(rho * H) - H
+    previous, before = np.abs(change).sum(), 0.0
     for sweep in range(1, MOST_SWEEPS + 1):
-        new = H_direct + F.gather(rho * H)
-        change = np.abs(new - H).sum()
-        H = new
-        scale = max(np.abs(H).sum(), 1e-300)
-        q = change / previous if previous else 0.5
-        previous = change
-        if change == 0 or (q < 1 and sweep > 1 and change * q / (1 - q) < residual * scale):
+        onward = F.gather(rho * change)
+        even = (column * lost * onward).sum(axis=0) / weight
+        H = H + change + even
+        change = onward - even * lost
+        size, scale = np.abs(change).sum(), max(np.abs(H).sum(), 1e-300)
+        q = size / previous if previous else 0.0
+        bound = max(q, 2 * q - before, slow)  # the ratio rises while faster light dies
+        previous, before = size, q
+        if size == 0 or (sweep >= LEAST_SWEEPS and bound < 1 and size / (1 - bound) < residual * scale):
             return H, sweep
-        if not np.isfinite(change) or (sweep > 50 and q > 1):
+        if not np.isfinite(size) or (sweep > 50 and q > 1):
             raise DoesNotConverge("light grows with every bounce")
-    raise DoesNotConverge(f"{MOST_SWEEPS} sweeps still change the light by {change / scale:.3g}")
+    raise DoesNotConverge(f"{MOST_SWEEPS} sweeps still change the light by {size / scale:.3g}")
