@@ -183,26 +183,27 @@ def _sweep(H_direct, H, rho, area, F, residual):
 
     The first changes are the noise of shooting, gone after a few sweeps; light that goes round a room dies slowest, by
     about the mean reflectance a sweep.  So the series is summed with the slowest of that ratio, the last one seen and
-    the one it rises to.  Each sweep also adds the even light that takes most from the changes to come (least squares):
-    where they end stays the same.
+    the one it rises to.  Each sweep also adds the even light, over all elements that have any, that takes most from the
+    changes to come (least squares): where they end stays the same, and what is dark stays dark.
     """
     column = area[:, None]
-    lost = 1 - F.gather(rho)  # of an even light of 1, by one sweep
+    even = (H > 0).astype(np.float64)
+    lost = even - F.gather(rho * even)  # by one sweep
     weight = np.maximum((column * lost * lost).sum(axis=0), 1e-300)
     slow = float(_round_trip(rho, area, F).max(initial=0.0))
     change = H_direct + F.gather(rho * H) - H
     previous, before = np.abs(change).sum(), 0.0
     for sweep in range(1, MOST_SWEEPS + 1):
         onward = F.gather(rho * change)
-        even = (column * lost * onward).sum(axis=0) / weight
-        H = H + change + even
-        change = onward - even * lost
+        share = (column * lost * onward).sum(axis=0) / weight
+        H = H + change + share * even
+        change = onward - share * lost
         size, scale = np.abs(change).sum(), max(np.abs(H).sum(), 1e-300)
         q = size / previous if previous else 0.0
         bound = max(q, 2 * q - before, slow)  # the ratio rises while faster light dies
         previous, before = size, q
         if size == 0 or (sweep >= LEAST_SWEEPS and bound < 1 and size / (1 - bound) < residual * scale):
-            return H, sweep
+            return np.maximum(H, H_direct), sweep
         if not np.isfinite(size) or (sweep > 50 and q > 1):
             raise DoesNotConverge("light grows with every bounce")
     raise DoesNotConverge(f"{MOST_SWEEPS} sweeps still change the light by {size / scale:.3g}")
