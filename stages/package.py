@@ -6,9 +6,10 @@ reads   scene.npz, casters.npz, textures.npz, lod_<k>.npz of every level, finest
 writes  RESULTS/textures/<surface>.png, scene_LOD<k>.gltf and .bin, scene.glb, lods.json
 
 Profile `standard`: KHR_materials_unlit, base colour texture = (B_final + E) / pi times exposure, sRGB, one a surface.
-A surface of one even colour gets that colour and no texture.  A surface that only casts shadows has no map: it is drawn
-in its reflectance, lit by the scene's mean irradiance.  Reconstruction `gouraud` puts the light into the vertices, and
-so does `auto` where it would not show: an untextured map at its smallest, whose lattice all levels hold.
+A surface of one even colour gets that colour and no texture.  A surface that only casts shadows has no map: its
+vertices carry an estimate, its reflectance in the lamps' light without shadows and the mean radiosity of the rest.
+Reconstruction `gouraud` puts a map's light into the vertices, and so does `auto` where it would not show: all levels
+have vertices on the lines of the map's lattice.
 """
 
 import json

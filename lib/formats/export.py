@@ -1,15 +1,18 @@
 """What the exported files hold: how each surface looks, its triangles in every level, and what lods.json says of them.
 
-A surface looks, in this order: as its own reflectance in the scene's mean light (no map: it only casts shadows); as one
-colour (an even map); by light in its vertices (`gouraud`, or `auto` where nothing would show); by its texture.
+A surface looks, in this order: by its reflectance in estimated light, in its vertices (no map: it only casts shadows);
+as one colour (an even map); by its map's light in its vertices (`gouraud`, or `auto` where nothing would show); by its
+texture.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from lib.formats import gltf, pictures
-from lib.maps import display, gouraud
+from lib.maps import display, estimate, gouraud
 
 FAR = 100  # a scene farther from the origin than this many of its sizes is exported around its own centre: float32
 GREY = (0.5, 0.5, 0.5)  # reflectance of what has none stated
@@ -17,11 +20,11 @@ GREY = (0.5, 0.5, 0.5)  # reflectance of what has none stated
 
 @dataclass(frozen=True)
 class Look:
-    """How a surface is drawn: material, (h, w) of its texture, or the linear light (h, w, 3) its vertices carry."""
+    """How a surface is drawn: its material, (h, w) of its texture, or in_vertices(V, N, UV) -> linear light (k, 3)."""
 
     material: gltf.Material
     size: tuple | None = None
-    in_vertices: np.ndarray | None = None
+    in_vertices: Callable | None = None
 
 
 def looks(x, shapes, maps, rho_avg, exposure, levels, results):
@@ -29,20 +32,27 @@ def looks(x, shapes, maps, rho_avg, exposure, levels, results):
 
     shapes : Casters;  maps : TexturedMaps;  rho_avg : {name: (3,)};  levels : LodMeshes;  results : Path
     """
-    area = shapes.area[maps.light.surface]
-    H = display.mean_irradiance(maps.light, maps.rho_avg, area)
+    mean_B = display.mean_radiosity(maps.final, shapes.area[maps.final.surface])
+    lamps = _facets(levels[-1], np.flatnonzero(x.E.any(axis=1)), x.E)
     out = []
     for s, name in enumerate(x.names):
         k = maps.final.position(s)
+        if k < 0 and x.is_black[s]:
+            out.append(Look(gltf.Material(name, colour=_clipped(display.light(x.E[s], exposure)))))
+            continue
         if k < 0:
-            own = display.light(np.asarray(rho_avg.get(name, GREY)) * H + x.E[s], exposure)
-            out.append(Look(gltf.Material(name, colour=_clipped(own))))
+            out.append(
+                Look(
+                    gltf.Material(name),
+                    in_vertices=_estimated(rho_avg.get(name, GREY), x.E[s], lamps, mean_B, exposure),
+                )
+            )
             continue
         light = display.picture(maps.final.map(k), maps.final.hidden_map(k), maps.E[k], exposure)
         if (light == light[0, 0]).all():
             out.append(Look(gltf.Material(name, colour=_clipped(light[0, 0]))))
-        elif _in_vertices(x.reconstruction[s], maps, k, light, [level.UV[_vertices(level, s)] for level in levels]):
-            out.append(Look(gltf.Material(name), in_vertices=light))
+        elif _in_vertices(x.reconstruction[s], light, [level.UV[_vertices(level, s)] for level in levels]):
+            out.append(Look(gltf.Material(name), in_vertices=partial(_from_map, light)))
         else:
             uri = f"textures/{x.files[s]}.png"
             pictures.write_png_srgb(results / uri, light)
@@ -51,17 +61,34 @@ def looks(x, shapes, maps, rho_avg, exposure, levels, results):
     return out
 
 
-def _in_vertices(asked, maps, k, light, vertices):
-    """True when map k's light goes into the vertices: asked for, or not to be told from its texture in any level."""
+def _facets(level, surfaces, E):
+    """Corners A, B, C (f, 3) and exitance (f, 3) of the facets of some surfaces of a level."""
+    faces = [np.arange(level.face_start[s], level.face_start[s + 1]) for s in surfaces]
+    owner = np.repeat(surfaces, [len(f) for f in faces])
+    F = level.F[np.concatenate(faces)] if len(faces) else np.empty((0, 3), int)
+    return *(level.V[F[:, k]] for k in range(3)), E[owner]
+
+
+def _estimated(rho, E, lamps, mean_B, exposure):
+    """A Look's in_vertices for a surface without a map."""
+
+    def shown(V, N, UV):
+        H = estimate.irradiance(V, N.astype(np.float64), *lamps, mean_B)
+        return display.light(np.asarray(rho) * H + E, exposure)
+
+    return shown
+
+
+def _from_map(light, V, N, UV):
+    return gouraud.at(light, UV)
+
+
+def _in_vertices(asked, light, vertices):
+    """True when a map's light goes into the vertices: asked for, or not to be told from its texture in any level."""
     if asked != "auto":
         return asked == "gouraud"
     h, w = light.shape[:2]
-    return (
-        maps.final.level[k] == 0
-        and not maps.textured[k]
-        and gouraud.is_untwisted(light)
-        and all(gouraud.holds_lattice(UV, w, h) for UV in vertices)
-    )
+    return gouraud.is_untwisted(light) and all(gouraud.holds_lattice(UV, w, h) for UV in vertices)
 
 
 def _clipped(light):
@@ -90,7 +117,8 @@ def pieces(level, looks, up, origin):
             h, w = look.size
             piece = replace(piece, ST=gltf.texture_coordinates(level.UV[own], w, h))
         elif look.in_vertices is not None:
-            piece = replace(piece, colour=np.clip(gouraud.at(look.in_vertices, level.UV[own]), 0.0, 1.0))
+            colour = look.in_vertices(level.V[own], level.N[own], level.UV[own])
+            piece = replace(piece, colour=np.clip(colour, 0.0, 1.0))
         out.append(piece)
     return out
 

@@ -15,17 +15,12 @@ def picture(value, hidden, E, exposure):
     return light(push_pull(value, hidden) + E, exposure)
 
 
-def mean_irradiance(maps, rho_avg, area):
-    """Mean irradiance (3,) [W/m^2] by area of the surfaces of a MapSet of B = rho_avg H; 0 where none reflects.
-
-    rho_avg : (m, 3) of the maps' surfaces;  area : (m,)
-    """
-    total, weight = np.zeros(3), np.zeros(3)
+def mean_radiosity(maps, area):
+    """Mean radiosity (3,) [W/m^2] by area of the visible samples of a MapSet whose surfaces have `area` (m,)."""
+    total, weight = np.zeros(3), 0.0
     for k in range(len(maps)):
         seen = ~maps.hidden_map(k)
         if seen.any():
-            reflects = rho_avg[k] > 0
-            mean = maps.map(k)[seen].mean(axis=0, dtype=np.float64)
-            total += area[k] * np.where(reflects, mean / np.where(reflects, rho_avg[k], 1), 0)
-            weight += area[k] * reflects
-    return total / np.where(weight > 0, weight, 1)
+            total += area[k] * maps.map(k)[seen].mean(axis=0, dtype=np.float64)
+            weight += area[k]
+    return total / weight if weight else total

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lib.maps import display, exposure, gouraud, mapset
+from lib.maps import display, estimate, exposure, gouraud, mapset
 
 
 def test_values_at_vertices_are_bilinear():
@@ -30,17 +30,28 @@ def test_a_twisted_cell_shows_its_diagonal():
     assert not gouraud.is_untwisted(twisted)
 
 
-def test_mean_irradiance_is_weighted_by_area_and_leaves_out_what_does_not_reflect():
-    maps = mapset.pack(
-        [0, 1, 2],
-        [[1, 1]] * 3,
-        [0, 0, 0],
-        [np.full((2, 2, 3), 1.0), np.full((2, 2, 3), 4.0), np.zeros((2, 2, 3))],
-        [np.zeros((2, 2), bool), np.array([[True, False], [False, False]]), np.zeros((2, 2), bool)],
+def test_mean_radiosity_is_weighted_by_area_and_leaves_hidden_samples_out():
+    hidden = [np.zeros((2, 2), bool), np.array([[True, False], [False, False]])]
+    four = np.full((2, 2, 3), 4.0)
+    four[0, 0] = 0
+    maps = mapset.pack([0, 1], [[1, 1]] * 2, [0, 0], [np.full((2, 2, 3), 1.0), four], hidden)
+    assert display.mean_radiosity(maps, np.array([3.0, 1.0])) == pytest.approx([7 / 4] * 3)
+
+
+def test_estimated_light_is_the_lamps_and_the_mean():
+    """A small lamp of area 0.01 at height 2: H = E A cos cos / (pi r^2); nothing from behind, nor behind the lamp."""
+    A, B, C = np.array([[[0, 0, 2.0]], [[0, 0.1, 2]], [[0.2, 0, 2]]])  # shines down
+    x = np.array([[0, 0, 0], [0, 0, 0], [2, 0, 0], [0, 0, 4.0]])
+    N = np.array([[0, 0, 1], [0, 0, -1], [0, 0, 1], [0, 0, -1.0]])
+    H = estimate.irradiance(x, N, A, B, C, np.array([[100.0, 50, 0]]), np.array([0.1, 0.2, 0.3]))
+    below, aside = 0.01 / (np.pi * 4), 0.01 * 0.25 / (np.pi * (2**2 + 2**2)) * 2  # cos^2 = 1/2
+    assert H[0] == pytest.approx([100 * below + 0.1, 50 * below + 0.2, 0.3], rel=0.02)
+    assert H[1] == pytest.approx([0.1, 0.2, 0.3]) and H[3] == pytest.approx([0.1, 0.2, 0.3])
+    assert H[2, 0] - 0.1 == pytest.approx(100 * aside, rel=0.1)
+    assert (
+        estimate.irradiance(x, N, A[:0], B[:0], C[:0], np.empty((0, 3)), np.ones(3)).tolist()
+        == np.ones((4, 3)).tolist()
     )
-    rho = np.array([[0.5, 0.5, 0.5], [0.5, 1.0, 0.25], [0.0, 0.0, 0.0]])
-    H = display.mean_irradiance(maps, rho, np.array([3.0, 1.0, 9.0]))
-    assert H == pytest.approx([(3 * 2 + 8) / 4, (3 * 2 + 4) / 4, (3 * 2 + 16) / 4])
 
 
 def test_light_is_radiance_times_exposure():

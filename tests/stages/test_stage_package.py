@@ -93,9 +93,12 @@ def test_colours(files):
 def test_a_caster_without_map_is_drawn_in_its_own_colour(files):
     _, results = run(files, {"exposure": 1.0})
     [ball] = [p for p in exported.load(results / "scene_LOD0.gltf")[0] if p.name == "ball"]
-    light = textured_maps.load(files / "textures.npz").light  # seven squares of equal area
-    B = np.mean([light.map(k)[~light.hidden_map(k)].mean(axis=0) for k in range(7)], axis=0)
-    assert ball.texture == -1 and np.allclose(ball.factor, [0.5, 0.5, 0.25] * B / 0.5 / np.pi, rtol=1e-6)
+    final = textured_maps.load(files / "textures.npz").final  # seven squares of equal area
+    B = np.mean([final.map(k)[~final.hidden_map(k)].mean(axis=0) for k in range(7)], axis=0)
+    ambient = [0.5, 0.5, 0.25] * B / np.pi
+    assert ball.texture == -1 and np.allclose(ball.colour.min(axis=0), ambient, rtol=1e-6)
+    # box/6, the lamp, is the side x = 1 of the box: it shines along +x, past the ball above it
+    assert np.allclose(ball.colour.max(axis=0), ambient, rtol=1e-6)
 
 
 def test_hidden_texels_are_filled(files):
@@ -137,7 +140,7 @@ def reconstruct(files, ways, level=2):
 def test_gouraud_puts_the_map_into_vertices_on_its_lattice(files):
     maps = reconstruct(files, {7: "gouraud"})
     _, results = run(files, {"exposure": 2.0})
-    assert read_json(results / "lods.json")["in_vertices"] == ["picture"]
+    assert read_json(results / "lods.json")["in_vertices"] == ["ball", "picture"]
     assert [p.name for p in (results / "textures").iterdir()] == ["001-s.png"]
     for k in (0, 1):
         [part] = [p for p in exported.load(results / f"scene_LOD{k}.gltf")[0] if p.name == "picture"]
@@ -150,10 +153,10 @@ def test_gouraud_puts_the_map_into_vertices_on_its_lattice(files):
 def test_auto_uses_vertices_only_where_nothing_shows(files):
     reconstruct(files, {1: "auto", 7: "auto"})
     _, results = run(files)
-    assert read_json(results / "lods.json")["in_vertices"] == []
+    assert read_json(results / "lods.json")["in_vertices"] == ["ball"]
     reconstruct(files, {2: "auto", 7: "auto"}, level=0)
     _, results = run(files)
-    assert read_json(results / "lods.json")["in_vertices"] == ["box/2", "picture"]
+    assert read_json(results / "lods.json")["in_vertices"] == ["ball", "box/2", "picture"]
     [part] = [p for p in exported.load(results / "scene.glb")[0] if p.name == "picture"]
     assert len(part.F) == 2 and part.colour is not None
 
