@@ -119,11 +119,12 @@ def contrast_at(points, solution):
     return np.where((n_u > 0) & (contrast[element] > 0), contrast[element], contrast.mean())
 
 
-def lookup_table(world, direct, solution):
+def lookup_table(world, direct, solution, follows_near=True):
     """Radiosity maps of every surface that reflects.
 
     direct : {surface: (value (h, w, G, 3), known, hidden)} direct trees on their lattices
     solution : has H_indirect (n, G, 3), share (n,), n_u, n_v, first, rho (surfaces, 3)
+    follows_near : near hits are followed on, which adds a reflection: not where they are numbered
     """
     maps = {}
     for s in np.flatnonzero(world.reflects & (solution.n_u > 0)):
@@ -131,7 +132,7 @@ def lookup_table(world, direct, solution):
         part = slice(solution.first[s], solution.first[s + 1])
         grid = int(solution.n_u[s]), int(solution.n_v[s])
         closed = world.lattices[s].closed
-        maps[int(s)] = radiosity_map(value, hidden, solution.H_indirect[part], solution.share[part], grid, solution.rho[s], closed, world.casters.area[s])
+        maps[int(s)] = radiosity_map(value, hidden, solution.H_indirect[part], solution.share[part], grid, solution.rho[s], closed, world.casters.area[s] * follows_near)
     return LookupTable(maps, world.mesh, world.n, world.channels)
 
 
