@@ -5,6 +5,7 @@ map of w samples puts u at s = (u (w - 1) + 0.5) / w, because samples lie on gri
 Colours are linear: images are sRGB files, factors and vertex colours are linear numbers, as glTF has it.
 """
 
+import json
 from dataclasses import dataclass
 from urllib.parse import quote
 
@@ -66,11 +67,21 @@ def _accessor(view, at, component, count, kind, low, high):
     )
 
 
+class _Gltf(g.GLTF2):
+    """The library's document, written as JSON in one pass: its own way copies every object, 0.2 s for 70 surfaces."""
+
+    def gltf_to_json(self, separators=None, indent=None):
+        def filled(part):
+            return {k: v for k, v in vars(part).items() if k[0] != "_" and v is not None and v != [] and v != {}}
+
+        return json.dumps(self, default=filled, separators=separators, indent=indent, allow_nan=False)
+
+
 class _Document:
     """A glTF document under construction, and the bytes of its one buffer."""
 
     def __init__(self, extras):
-        self.gltf = g.GLTF2(asset=g.Asset(version="2.0", generator=GENERATOR, extras={KEY: extras}), scenes=[], scene=0)
+        self.gltf = _Gltf(asset=g.Asset(version="2.0", generator=GENERATOR, extras={KEY: extras}), scenes=[], scene=0)
         self.blob = bytearray()
         self.extras = extras
 
