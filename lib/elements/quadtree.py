@@ -2,7 +2,8 @@
 
 Predicate (midpoint rule): a leaf is divided if one of the five midpoints measured in its PARENT departs from the parent's bilinear
 prediction by more than tau.  At the base level, where no parent was measured, it is the contrast of the four corners.
-Hidden samples take no part.  A leaf that is wide beside the free space above one of its corners is divided as well, for a few levels: light
+Hidden samples take no part in it; a leaf with hidden and visible corners lies along a contact, where light changes
+fast, and is divided for that.  A leaf that is wide beside the free space above one of its corners is divided as well, for a few levels: light
 that bounces changes within such distances (Ward et al. 1988), and a contact can lie between samples that agree.  The tree is kept balanced, and corners that balancing adds are measured like any other.
 """
 
@@ -10,6 +11,7 @@ import numpy as np
 
 from lib.elements.balance import balance, children, grow
 
+CONTACT_CELL = 1 / 200  # of the scene's largest side: cells along a contact are divided down to this
 WIDE, WIDE_LEVELS = 1.0, 2  # root-cell widths; levels below the base
 
 SMALLEST_CELL = 1e-3  # of the scene's largest side: finer than anybody sees
@@ -93,10 +95,18 @@ class Quadtree:
         return children(self.divided[level - 1]) if level else np.ones(self.lattice.cells(0), dtype=bool)
 
     def _exceeds(self, level, tau):
-        if level == self.base:
-            return (self.contrast(level) > tau) | self._is_wide(level)
-        exceeds = children(self.residual(level - 1) > tau)
-        return exceeds | self._is_wide(level) if level < self.base + WIDE_LEVELS else exceeds
+        exceeds = self.contrast(level) > tau if level == self.base else children(self.residual(level - 1) > tau)
+        if level < self.base + WIDE_LEVELS:
+            exceeds |= self._is_wide(level)
+        if self.side * 2.0**-level > CONTACT_CELL:
+            exceeds |= self._is_contact(level)
+        return exceeds
+
+    def _is_contact(self, level):
+        """Cells with hidden and visible corners: along the line where another object touches, (rows, columns)."""
+        hidden = self.hidden[:: 2 ** (self.level - level), :: 2 ** (self.level - level)]
+        corners = np.stack([hidden[:-1, :-1], hidden[:-1, 1:], hidden[1:, :-1], hidden[1:, 1:]])
+        return corners.any(axis=0) & ~corners.all(axis=0)
 
     def _is_wide(self, level):
         """Cells wider than WIDE times the free space above one of their corners: (rows, columns)."""

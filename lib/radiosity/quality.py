@@ -2,8 +2,8 @@
 
 Model: the relative RMS error of a map is the root of the sum of squares of
 
-    gather         0.6 % (800 / K)^0.8
-    lookups        0.5 % (1600 / n_elements)^0.3
+    gather         0.6 % (960 / K)^0.8
+    lookups        0.5 % (4000 / n_elements)^0.3
     direct light   0.5 % (64 / n1)^0.5
     interpolation  0.4 % (t / 0.025)
 
@@ -41,12 +41,12 @@ def quality(tolerance, max_level=8):
     The number of elements changes in steps, so that most changes of the tolerance leave the solved elements as they are.
     """
     ratio = tolerance / 0.01
-    elements = 1600 if tolerance >= 0.0075 else 4000 if tolerance >= 0.004 else 10000
-    rays = _multiple_of_16(800 * ratio**-1.25, 32, 4096)
+    elements = 4000 if tolerance >= 0.0075 else 16000 if tolerance >= 0.004 else 40000
+    rays = _multiple_of_16(960 * ratio ** (-1.25 if ratio < 1 else -2.0), 32, 4096)
     n1 = 32 if tolerance >= 0.015 else 64 if tolerance >= 0.0075 else 256
     return Quality(
         n_elements=elements,
-        rays_per_element=256,
+        rays_per_element=64,
         gather_rays=rays,
         shadow_rays=(16, n1),
         first_shadow_rays=(16, 64),

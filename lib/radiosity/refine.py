@@ -5,12 +5,13 @@ import numpy as np
 from lib.elements.balance import parents
 from lib.elements.quadtree import Quadtree
 from lib.maps.resample import resample
-from lib.radiosity.gather import LookupTable, indirect_light, radiosity_map
+from lib.radiosity.gather import MOST_STEPS, LookupTable, indirect_light, radiosity_map
 from lib.radiosity.sampling import direct_at, points_at
 
 LARGE_CELL = 1 / 8  # of the scene's largest side
 LEAST_RAYS = 32
 USUAL_CONTRAST = 0.6
+AVERAGED = 0.8  # between samples, interpolation averages their noise
 SMOOTH = 0.25  # dividing a cell once more leaves a quarter of the departure of a smooth field
 
 
@@ -66,10 +67,11 @@ def refine_direct(world, base, seed, tau, top, shadow_rays):
     return trees, spared
 
 
-def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
+def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, steps=MOST_STEPS):
     """Indirect trees of `surfaces`, by gather rays through the LookupTable: {surface: Quadtree}.
 
-    solution : has spread, H_element, n_u, n_v, first; K gather rays for a large cell of usual surroundings.
+    solution : has spread, H_element, n_u, n_v, first; K gather rays for a large cell of usual surroundings;
+    steps : how deep near hits are followed, 0 where the number of reflections is fixed.
     """
     trees = {s: Quadtree(world.lattices[s], world.base_level(s, level), world.channels, world.side(s)) for s in surfaces}
 
@@ -80,7 +82,7 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
         for k in np.unique(rays):
             of = np.flatnonzero(rays == k)
             light = indirect_light(
-                points.x[of], points.N[of], points.shift[of], int(k), world.tracer, world.mesh, table, world.channels
+                points.x[of], points.N[of], points.shift[of], int(k), world.tracer, world.mesh, table, world.channels, steps
             )
             for array, part in zip(out, (light.H, light.hidden, light.noise, light.reach), strict=True):
                 array[of] = part
@@ -139,7 +141,7 @@ def lookup_table(world, direct, solution, follows_near=True):
 def error_of(tree):
     """Estimated RMS error of a tree's map [W/m^2]: sampling noise, and what the leaves still depart from their prediction."""
     seen = tree.known & ~tree.hidden
-    noise = float(np.sqrt((tree.noise[seen].astype(np.float64) ** 2).mean())) if seen.any() else 0.0
+    noise = AVERAGED * float(np.sqrt((tree.noise[seen].astype(np.float64) ** 2).mean())) if seen.any() else 0.0
     departure, cells = 0.0, 0
     for level in range(max(tree.base - 1, 0), tree.level):
         last = tree.divided[level] if level + 1 >= len(tree.divided) else tree.divided[level] & ~parents(tree.divided[level + 1])

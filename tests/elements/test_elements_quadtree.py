@@ -5,7 +5,7 @@ import pytest
 
 from lib.elements.balance import is_balanced
 from lib.elements.lattice import Lattice
-from lib.elements.quadtree import SMALLEST_CELL, WIDE, WIDE_LEVELS, Quadtree
+from lib.elements.quadtree import CONTACT_CELL, SMALLEST_CELL, WIDE, WIDE_LEVELS, Quadtree
 
 SQUARE = Lattice((1, 1))
 
@@ -108,13 +108,16 @@ def test_corners_of_every_leaf_are_known_and_t_vertices_too():
 
 
 def test_hidden_samples_take_no_part():
-    """A buried half with values of its own: neither it nor its rim is divided."""
+    """A buried half with values of its own: its values divide nothing, only the contact along its rim does, down to CONTACT_CELL."""
 
     def buried(u, v):
         return u > 0.5
 
-    tree = grown(lambda u, v: np.where(buried(u, v), 1e6, 1.0), tau=0.1, top=5, hidden=buried, base=2)
+    tree = grown(lambda u, v: np.where(buried(u, v), 1e6, 1.0), tau=0.1, top=5, hidden=buried, base=2, side=4 * CONTACT_CELL)
     assert tree.level == 2
+    rim = grown(lambda u, v: np.where(buried(u, v), 1e6, 1.0), tau=0.1, top=5, hidden=buried, base=2, side=16 * CONTACT_CELL)
+    picture = np.array([[int(c) for c in row] for row in drawing(rim)])
+    assert rim.level == 4 and (picture[:, 8] == 4).all() and (picture[:, 0] == 2).all() and (picture[:, -1] == 2).all()
     assert grown(lambda u, v: np.where(buried(u, v), 1e6, 1.0), tau=0.1, top=5, base=2).level == 5
     assert grown(lambda u, v: u * 0 + 1e6, tau=0.1, top=5, hidden=lambda u, v: u >= 0).level == 1
 
@@ -161,7 +164,7 @@ def test_middles_of_cells_are_compared_as_well():
 
 
 def test_hidden_middles_are_not():
-    tree = grown(spike, tau=0.5, top=3, hidden=lambda u, v: (u == 0.25) & (v == 0.25))
+    tree = grown(spike, tau=0.5, top=3, hidden=lambda u, v: (u == 0.25) & (v == 0.25), side=2 * CONTACT_CELL)
     assert drawing(tree) == ["2222"] * 4
 
 
