@@ -102,6 +102,8 @@ def run(doc, arguments, body, argv=None):
         print(cost.stopped, file=sys.stderr, flush=True)
         log.add(cost.stopped)
         return 1
+    except KeyboardInterrupt:  # the user knows why
+        return 130
     except Exception as error:  # a fault of ours: the whole story goes to the terminal and to the log
         cost.stopped = f"{cost.stage}: {type(error).__name__}: {error}; a fault of this program"
         log.add(traceback.format_exc())

@@ -71,6 +71,8 @@ def body(args, cost):
         final_hidden.append(hidden)
         final_level.append(level)
 
+    sweep(Path(args.maps_folder), {x.files[s] for s in chunk.maps.surface})
+
     maps, names = chunk.maps, [x.names[s] for s in chunk.maps.surface]
     cost.notes["textured_surfaces"] = sum(name in textures for name in names)
     textured_maps.save(
@@ -142,6 +144,13 @@ def textured(B, hidden, roots, level, surface, picture, repeat, rho_avg, texture
         picture, repeat, w, h, base_texture.wraps(surface, repeat), collapsed_sides(surface)
     )
     return common, base_texture.apply(B, rho, rho_avg), hidden
+
+
+def sweep(folder, stems):
+    """Remove the maps of surfaces that the scene no longer has."""
+    for path in folder.glob("*.exr"):
+        if path.stem not in stems:
+            path.unlink()
 
 
 def write_map(path, B, hidden, name, surface, rho_avg):

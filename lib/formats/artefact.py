@@ -1,7 +1,8 @@
 """Files that stages exchange: written whole or not at all, and checked when read.
 
-An artefact is an uncompressed .npz: a JSON header (kind, version, what the stage adds) and named arrays.  The bytes depend on the
-content alone.  The zip container's CRC-32 of every member is checked on reading, and so are kind, version and the member list.
+An artefact is an uncompressed .npz: a JSON header (kind, version, what the stage adds) and named arrays.  The bytes
+depend on the content alone.  The zip container's CRC-32 of every member is checked on reading, and so are kind,
+version and the member list.
 """
 
 import io
@@ -25,7 +26,7 @@ class ArtefactError(Exception):
 def atomic(path):
     """Open a binary file that becomes `path` at the end of the block: unique name beside it, flushed, synced, renamed.
 
-    Raises ArtefactError naming the path when the folder can not be written or the disk is full; then `path` is as before.
+    Raises ArtefactError naming the path when it can not be written or the disk is full; `path` is as before then.
     """
     path = Path(path)
     name = None
@@ -73,8 +74,8 @@ def read(path, kind, version):
         with zipfile.ZipFile(path) as archive:
             header = json.loads(archive.read("header.json"))
             if (header.get("kind"), header.get("version")) != (kind, version):
-                found = f"{header.get('kind')} version {header.get('version')}"
-                raise ArtefactError(f"{path}: {found}, expected {kind} version {version}; delete it to have it made again")
+                found = f"{header.get('kind')} version {header.get('version')}, expected {kind} version {version}"
+                raise ArtefactError(f"{path}: {found}; delete it to have it made again")
             arrays = {}
             for name in header.pop("arrays"):
                 data = archive.read(f"{name}.npy")  # reading to the end checks the CRC
@@ -83,7 +84,9 @@ def read(path, kind, version):
         raise
     except FileNotFoundError as error:
         raise ArtefactError(f"{path}: missing") from error
-    except (OSError, zipfile.BadZipFile, KeyError, ValueError, EOFError) as error:
+    except PermissionError as error:
+        raise ArtefactError(f"{path}: can not be read: {error.strerror}") from error
+    except Exception as error:  # zipfile has a dozen ways to say that it does not understand a damaged file
         raise ArtefactError(f"{path}: damaged ({error}); delete it to have it made again") from error
     return header, arrays
 
@@ -100,5 +103,7 @@ def read_json(path):
         return json.loads(Path(path).read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise ArtefactError(f"{path}: missing") from error
+    except PermissionError as error:
+        raise ArtefactError(f"{path}: can not be read: {error.strerror}") from error
     except (OSError, ValueError) as error:
         raise ArtefactError(f"{path}: damaged ({error}); delete it to have it made again") from error

@@ -1,4 +1,4 @@
-"""The slice of a scene's settings that each stage reads, and no more: what is not in a slice can not re-run its stage."""
+"""The slice of a scene's settings that each stage reads, and no more: what is not in it can not re-run the stage."""
 
 import json
 import re
@@ -8,7 +8,7 @@ from lib.radiosity.quality import quality
 RAYS_A_JOB = 12e6  # about 4 s of one core
 MOST_CHUNKS = 64
 SHADOW_RAYS = 24  # a sample, of a few lights in view
-GATHER_RAYS = 0.16  # of a sample, an element of the coarse solution: what a tolerance asks for that goes with as many
+GATHER_RAYS = 0.2  # of a sample, an element of the coarse solution: roughly what a tolerance asks for with as many
 MOST_WARNINGS = 100  # told the report: they are part of a command line
 
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from lib.elements.lattice import MOST_ROOTS, roots_of
 from lib.formats import (
     geometry_file,
     pictures,
@@ -16,6 +17,8 @@ from lib.formats import (
 )
 from lib.formats.mistakes import Mistakes
 from lib.maps.base_texture import rho_average
+from lib.maps.budget import gpu_bytes, smallest_total
+from lib.nurbs.shape import extent
 from lib.nurbs.tessellate import frame
 from lib.refusal import Refusal
 
@@ -52,10 +55,12 @@ def run(folder, overrides=None):
     textures, rho_avg = _reflectances(source, made, warnings)
     digests = {name: geometry_file.digest(source.folder / name) for name in _geometry_files(wanted)}
     pictures_used = {row["file"]: geometry_file.digest(row["file"]) for row in textures.values()}
+    resolved = settings.resolve(wanted, float(frame(made.surfaces)[1]))
+    _check_budget(resolved["budget"], source, made)
     area = {one.name: one.area for one in placed}
     materials = wanted.get("materials", {})
     outcome = {
-        "settings": settings.resolve(wanted, float(frame(made.surfaces)[1])),
+        "settings": resolved,
         "names": made.names,
         "files": made.files,
         "roles": made.role,
@@ -84,6 +89,20 @@ def run(folder, overrides=None):
     return Found(
         source.file, outcome, slices, {**inputs, **pictures_used, str(scene_file): geometry_file.digest(scene_file)}
     )
+
+
+def _check_budget(T, source, made):
+    """Refuse a texture budget [bytes] that the smallest maps of these surfaces exceed."""
+    mapped = [s for s, role in enumerate(made.role) if role != "cast_only" and not made.is_black[s]]
+    if T >= len(mapped) * gpu_bytes(MOST_ROOTS + 1, 2):  # spares measuring them
+        return
+    smallest = smallest_total([roots_of(extent(made.surfaces[s])) for s in mapped])
+    if T < smallest:
+        file, line = source.where(("budget",))
+        mistakes = Mistakes()
+        possible = f"the smallest possible total of these {len(mapped)} textures is {smallest} bytes"
+        mistakes.add(f"{T} bytes can not be met; {possible}", file, field="budget", line=line)
+        mistakes.stop()
 
 
 def _geometry_files(wanted):

@@ -155,6 +155,24 @@ def test_chunks_and_their_order_do_not_matter(tmp_path):
         assert (tmp_path / "out.npz").read_bytes() == whole
 
 
+def test_maps_of_surfaces_the_scene_no_longer_has_are_removed(tmp_path):
+    (tmp_path / "maps").mkdir()
+    (tmp_path / "maps" / "003-gone.exr").write_bytes(b"")
+    run(tmp_path, build(tmp_path)[2])
+    assert sorted(path.name for path in (tmp_path / "maps").iterdir()) == ["001-painted.exr", "002-wall.exr"]
+
+
+def test_textures_lie_below_the_folder_of_the_scene(tmp_path):
+    options = build(tmp_path)[2]
+    run(tmp_path, options)
+    whole = (tmp_path / "out.npz").read_bytes()
+    textures = tmp_path / "textures.json"
+    textures.write_text(textures.read_text().replace(str(tmp_path / "paint.png"), "paint.png"))
+    (tmp_path / "folder.json").write_text(json.dumps({"folder": str(tmp_path)}))
+    run(tmp_path, options)
+    assert (tmp_path / "out.npz").read_bytes() == whole
+
+
 def test_same_input_same_bytes(tmp_path):
     _, _, options = build(tmp_path)
     files = ["out.npz", "maps/001-painted.exr", "maps/002-wall.exr"]

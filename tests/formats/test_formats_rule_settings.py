@@ -1,0 +1,86 @@
+"""Slices of the settings: each setting moves the slices of the stages that read it, and no other."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from lib.formats import settings as scene_settings
+from lib.formats import strict_yaml
+from lib.formats.rule_settings import MOST_CHUNKS, n_chunks, rule_settings
+
+DEFAULTS = Path(__file__).parents[2] / "config" / "bake.yaml"
+QUALITY = {"sample", "shoot", "refine", "balance_resample"}
+
+
+def settings(**changed):
+    """Resolved default settings of a scene 10 m across; bake__x=1 sets x of bake."""
+    tree = json.loads(json.dumps(strict_yaml.read(DEFAULTS, str(DEFAULTS))))
+    for name, value in changed.items():
+        *path, last = name.split("__")
+        part = tree
+        for step in path:
+            part = part[step]
+        part[last] = value
+    return scene_settings.resolve(tree, 10.0)
+
+
+@pytest.mark.parametrize(
+    "changed, stages",
+    [
+        ({"lods": [0.5]}, {"lod_export"}),
+        ({"lods": [{"deviation": "1 mm"}]}, {"lod_export"}),
+        ({"budget": "2 MiB"}, {"budget_reduce"}),
+        ({"export__exposure": 2}, {"package"}),
+        ({"camera": {"eye": [0, 0, 1], "target": [1, 1, 1]}}, set()),
+        ({"up": "y"}, set()),  # of the geometry, which has its own slice
+        ({"bake__chunks": 3}, set()),  # a param of its own
+        ({"bake__tolerance": 0.012}, {"refine", "balance_resample"}),
+        ({"bake__tolerance": 0.003}, QUALITY),  # more elements
+        ({"bake__relative_to": "surface"}, {"refine", "balance_resample"}),
+        ({"bake__max_level": 4}, {"refine"}),
+        ({"bake__bounces": 1}, {"sample", "shoot", "refine"}),
+        ({"bake__seed": 2}, {"sample", "refine"}),
+        ({"bake__convergence": 0.01}, {"shoot"}),
+        ({"bake__sag": 0.01}, {"tessellate"}),
+        ({"bake__elements": 100}, {"sample", "shoot"}),
+        ({"bake__rays_per_element": 128}, {"sample"}),
+        ({"bake__gather_rays": 1008}, {"refine"}),
+        ({"bake__texture_level": 5}, {"apply_base_texture"}),
+    ],
+    ids=str,
+)
+def test_a_setting_moves_its_slices_alone(changed, stages):
+    before, after = rule_settings(settings()), rule_settings(settings(**changed))
+    moved = {stage for stage in before if before[stage] != after[stage]}
+    assert moved - {"report"} == stages
+    assert "report" in moved  # it shows them all
+
+
+def test_the_same_settings_in_another_order_are_the_same_text():
+    plain = settings()
+    turned = dict(reversed([(k, dict(reversed(v.items())) if isinstance(v, dict) else v) for k, v in plain.items()]))
+    assert rule_settings(turned) == rule_settings(plain)
+
+
+def test_no_text_looks_like_a_wildcard_and_none_is_changed():
+    warnings = ["surface {c}: flip it", "a \\{wildcards.c} b", "{ input,x} {}", 'quote "{d}"']
+    text = rule_settings(settings(), warnings)["report"]
+    assert json.loads(text)["warnings"] == warnings
+    for name in ("{c", "{wildcards", "{ input", "{d"):
+        assert name not in text
+
+
+def test_thousands_of_warnings_fit_a_command_line():
+    warnings = [f"surface number {k}: its corners coincide with those of another" for k in range(5000)]
+    text = rule_settings(settings(), warnings)["report"]
+    assert len(text) < 50_000 and json.loads(text)["warnings"][-1].startswith("and 4900 more")
+
+
+def test_chunks_follow_the_scene_and_not_the_tolerance():
+    plain = settings()
+    assert n_chunks(plain, 0) == n_chunks(plain, 1) == 1
+    assert 1 < n_chunks(plain, 200) <= n_chunks(plain, 400) <= n_chunks(plain, 100_000) == MOST_CHUNKS
+    for tolerance in (0.009, 0.013, 0.02):  # one step of the number of elements
+        assert n_chunks(settings(bake__tolerance=tolerance), 200) == n_chunks(plain, 200)
+    assert n_chunks(settings(bake__chunks=7), 1) == 7
