@@ -12,7 +12,6 @@ import numpy as np
 
 from lib import door
 from lib.formats import casters, samples, scene, solution, trees
-from lib.radiosity.gather import MOST_STEPS
 from lib.radiosity.refine import error_of, lookup_table, refine_direct, refine_indirect
 from lib.radiosity.thresholds import thresholds
 from lib.radiosity.world import World
@@ -49,8 +48,7 @@ def body(args, cost):
         follows = chosen["bounces"] == "converge"
         table = lookup_table(world, direct, solved, follows)
         done = refine_indirect(
-            world, mine, table, solved, chosen["seed"], tau, chosen["top"], chosen["base_indirect"], chosen["gather_rays"],
-            MOST_STEPS if chosen["bounces"] == "converge" else 0,
+            world, mine, table, solved, chosen["seed"], tau, chosen["top"], chosen["base_indirect"], chosen["gather_rays"]
         )
     trees.save(args.out, args.half, {int(s): stored(t, world.n_groups) for s, t in done.items()}, cost.notes)
     cost.rays = world.tracer.rays

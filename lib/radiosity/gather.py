@@ -129,8 +129,8 @@ class IndirectLight:
     reach: np.ndarray
 
 
-def indirect_light(x, N, shift, K, tracer, mesh, table, channels, steps=MOST_STEPS):
-    """Gather at points x (n, 3), lifted, with normals N (n, 3), by K rays each; near hits are followed `steps` deep."""
+def indirect_light(x, N, shift, K, tracer, mesh, table, channels):
+    """Gather at points x (n, 3), lifted, with normals N (n, 3), by K rays each."""
     n = len(x)
     points, onward = fibonacci(K), weyl(K).astype(np.float32)
     H = np.zeros((n, channels), dtype=np.float32)
@@ -143,7 +143,7 @@ def indirect_light(x, N, shift, K, tracer, mesh, table, channels, steps=MOST_STE
         origins = np.repeat(x[part].astype(np.float32), K, axis=0)
         hits = tracer.closest(origins, D)
         random = ((onward[None] + shift[part, None, ::-1]) % 1.0).reshape(-1, 2)
-        seen = _follow(origins, D, hits, random, tracer, mesh, table, steps).reshape(k, K, channels)
+        seen = _follow(origins, D, hits, random, tracer, mesh, table, MOST_STEPS).reshape(k, K, channels)
         H[part] = seen.mean(axis=1)
         noise[part] = NOISE * seen.std(axis=1).max(axis=1) / K**0.8
         back = hits.is_back.reshape(k, K)

@@ -5,7 +5,7 @@ import numpy as np
 from lib.elements.balance import parents
 from lib.elements.quadtree import Quadtree
 from lib.maps.resample import resample
-from lib.radiosity.gather import MOST_STEPS, LookupTable, indirect_light, radiosity_map
+from lib.radiosity.gather import LookupTable, indirect_light, radiosity_map
 from lib.radiosity.sampling import direct_at, points_at
 
 LARGE_CELL = 1 / 8  # of the scene's largest side
@@ -67,11 +67,10 @@ def refine_direct(world, base, seed, tau, top, shadow_rays):
     return trees, spared
 
 
-def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, steps=MOST_STEPS):
+def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
     """Indirect trees of `surfaces`, by gather rays through the LookupTable: {surface: Quadtree}.
 
-    solution : has spread, H_element, n_u, n_v, first; K gather rays for a large cell of usual surroundings;
-    steps : how deep near hits are followed, 0 where the number of reflections is fixed.
+    solution : has spread, H_element, n_u, n_v, first; K gather rays for a large cell of usual surroundings.
     """
     trees = {s: Quadtree(world.lattices[s], world.base_level(s, level), world.channels, world.side(s)) for s in surfaces}
 
@@ -82,7 +81,7 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, 
         for k in np.unique(rays):
             of = np.flatnonzero(rays == k)
             light = indirect_light(
-                points.x[of], points.N[of], points.shift[of], int(k), world.tracer, world.mesh, table, world.channels, steps
+                points.x[of], points.N[of], points.shift[of], int(k), world.tracer, world.mesh, table, world.channels
             )
             for array, part in zip(out, (light.H, light.hidden, light.noise, light.reach), strict=True):
                 array[of] = part
@@ -134,7 +133,10 @@ def lookup_table(world, direct, solution, follows_near=True):
         part = slice(solution.first[s], solution.first[s + 1])
         grid = int(solution.n_u[s]), int(solution.n_v[s])
         closed = world.lattices[s].closed
-        maps[int(s)] = radiosity_map(value, hidden, solution.H_indirect[part], solution.share[part], grid, solution.rho[s], closed, world.casters.area[s] * follows_near)
+        maps[int(s)] = radiosity_map(
+            value, hidden, solution.H_indirect[part], solution.share[part], grid, solution.rho[s], closed,
+            world.casters.area[s] * follows_near,
+        )
     return LookupTable(maps, world.mesh, world.n, world.channels)
 
 
