@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lib.visibility.hemisphere import cosine_directions
-from lib.visibility.hidden import is_hidden
+from lib.visibility.hidden import RAYS, are_buried, is_hidden
 from lib.visibility.qmc import r2
 
 NOTHING = -1  # the ray left the scene
@@ -52,6 +52,10 @@ def element_rows(x, N, shift, R, tracer, mesh, grids):
         in_shell = mesh.is_shell(hits.face)
         shape = (k * points, per_point)
         buried = is_hidden(hits.is_back.reshape(shape), in_shell.reshape(shape))
+        doubt = np.flatnonzero(buried) if per_point < RAYS else ()
+        if len(doubt):
+            shifts = np.repeat(shift[part], points, axis=0)[doubt]
+            buried[doubt] = are_buried(x[part].reshape(-1, 3)[doubt], normals[doubt], shifts, tracer, mesh)
         element = np.where(buried[:, None], NO_RAY, element.reshape(shape))
         entries[part] = element.reshape(k, -1)
         hidden[part] = buried.reshape(k, points)

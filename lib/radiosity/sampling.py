@@ -11,11 +11,8 @@ from lib.nurbs.evaluate import evaluate_grid, frame_grid
 from lib.radiosity.direct import direct_light
 from lib.radiosity.rows import Rows, element_rows
 from lib.radiosity.world import FINEST
-from lib.visibility.hemisphere import cosine_directions
-from lib.visibility.hidden import is_hidden
-from lib.visibility.qmc import r2, shift, stream
-
-HIDDEN_RAYS = 16  # decide for a sample without light of its own
+from lib.visibility.hidden import are_buried
+from lib.visibility.qmc import shift, stream
 
 
 @dataclass(frozen=True)
@@ -55,21 +52,8 @@ def direct_at(world, points, shadow_rays):
     hidden = np.zeros(len(points.x), dtype=bool)
     dark = np.flatnonzero(light.H.max(axis=(1, 2), initial=0.0) <= 0)
     if dark.size:
-        hidden[dark] = hidden_at(world, points.x[dark], points.N[dark], points.shift[dark])
+        hidden[dark] = are_buried(points.x[dark], points.N[dark], points.shift[dark], world.tracer, world.mesh)
     return light, hidden
-
-
-def hidden_at(world, x, N, shifts):
-    """(n,) bool: the points are buried, judged by 16 rays each."""
-    out = np.zeros(len(x), dtype=bool)
-    sequence = r2(HIDDEN_RAYS)
-    for first in range(0, len(x), 1024):
-        part = slice(first, first + 1024)
-        D = cosine_directions(N[part], sequence, shifts[part])
-        hits = world.tracer.closest(np.repeat(x[part].astype(np.float32), HIDDEN_RAYS, axis=0), D.reshape(-1, 3))
-        shape = (len(x[part]), HIDDEN_RAYS)
-        out[part] = is_hidden(hits.is_back.reshape(shape), world.mesh.is_shell(hits.face).reshape(shape))
-    return out
 
 
 def base_lattice(world, surfaces, seed, level, shadow_rays):

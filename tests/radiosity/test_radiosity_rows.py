@@ -90,3 +90,13 @@ def test_buried_points_cast_no_ray_and_have_no_area():
     assert (floor.rows.entries[floor.rows.is_hidden.all(axis=1)] == NO_RAY).all()
     assert 1 - floor.area.sum() / world.casters.area[1] == pytest.approx(np.pi * r * r, rel=0.05)
     assert floor.rows.is_hidden.mean() == pytest.approx(np.pi * r * r, rel=0.05)
+
+
+@pytest.mark.parametrize("R", [16, 64, 256])
+def test_points_below_a_sheet_are_not_buried_by_chance(R):
+    """A table top over 80 % of the floor's sky: a single ray, or four, may all meet its back."""
+    top = rectangle([0, 0, 0.25], [1, 0, 0], [0, 1, 0])
+    surfaces = {"floor": (rectangle([0, 0, 0], [1, 0, 0], [0, 1, 0]), {}), "top": (top, {})}
+    floor = rows_of(world_of(surfaces), R=R)[0][0]
+    assert floor.rows.is_hidden.mean() < 0.02
+    assert ((floor.rows.entries == ABSORBED).mean() > 0.4) and floor.area.sum() > 0.98
