@@ -1,7 +1,8 @@
 """The two reference scenes as scene folders, and the irradiance of a finished bake at their points.
 
-The surfaces are the exact ones of scene.json: rectangles cut round the holes of the lights, torus and sphere as rational quadratics, the
-teapot's Bezier patches.  The reference's own (u, v) of torus and sphere are angles; `at_points` converts them.
+The surfaces are the exact ones of scene.json: rectangles cut round the holes of the lights, torus and sphere as
+rational quadratics, the teapot's Bezier patches.  The reference's own (u, v) of torus and sphere are angles;
+`at_points` converts them.
 """
 
 import json
@@ -63,7 +64,11 @@ def torus(shape):
     b = np.cross(w, a)
     ring = CIRCLE[:, :1] * a + CIRCLE[:, 1:] * b
     reach = shape["R"] + shape["r"] * CIRCLE[:, 0]
-    P = np.array(shape["centre"]) + ring[:, None] * reach[None, :, None] + (shape["r"] * CIRCLE[:, 1])[None, :, None] * w
+    P = (
+        np.array(shape["centre"])
+        + ring[:, None] * reach[None, :, None]
+        + (shape["r"] * CIRCLE[:, 1])[None, :, None] * w
+    )
     return nurbs(2, 2, CIRCLE_KNOTS, CIRCLE_KNOTS, P, np.outer(CIRCLE_W, CIRCLE_W))
 
 
@@ -109,7 +114,14 @@ def write_scene(name, folder, bake):
             if surface["flip"]:
                 overrides[piece] = {"flip": True}
     units = "m" if data["units"] == "metres" else "mm"
-    scene = {"units": units, "up": "y", "geometry": geometry, "materials": materials, "surfaces": overrides, "bake": bake}
+    scene = {
+        "units": units,
+        "up": "y",
+        "geometry": geometry,
+        "materials": materials,
+        "surfaces": overrides,
+        "bake": bake,
+    }
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "scene.yaml").write_text(yaml.safe_dump(scene, sort_keys=False))
@@ -118,8 +130,8 @@ def write_scene(name, folder, bake):
 def angle_to_parameter(turn):
     """Parameter of the rational circle at `turn` full turns: inverse of the quarter arc's rational quadratic."""
     quarter = np.minimum(np.floor(turn * 4), 3)
-    t = np.tan((turn * 4 - quarter) * np.pi / 2 / 2)  # half-angle tangent, 0..tan(pi/8)*... of a quarter
-    # cos = ((1-x)^2 + sqrt2 x(1-x)) / w, sin = (x^2 + sqrt2 x(1-x)) / w, so tan(half) = x / (x + sqrt2 (1 - x)) ... solved for x
+    t = np.tan((turn * 4 - quarter) * np.pi / 4)  # of half the angle
+    # cos = ((1-x)^2 + sqrt2 x(1-x)) / w, sin = (x^2 + sqrt2 x(1-x)) / w give t = x / (x + sqrt2 (1 - x)); solved for x
     x = np.sqrt(2) * t / (1 + (np.sqrt(2) - 1) * t)
     return (quarter + x) / 4
 

@@ -1,7 +1,8 @@
-"""Turn the trees of a chunk into plain maps: balance, the recursive bilinear transform, direct and indirect added, idle levels dropped.
+"""Turn the trees of a chunk into plain maps: balance, the recursive bilinear transform, direct and indirect added,
+idle levels dropped.
 
-reads   scene.npz, solution.npz, direct_<c>.npz, indirect_<c>.npz                  (lib.formats.scene, .solution, .trees)
-writes  chunk_<c>.npz: irradiance H per light group                                (lib.formats.light_maps)
+reads   scene.npz, solution.npz, direct_<c>.npz, indirect_<c>.npz                  (lib.formats.scene, .solution,
+.trees) writes  chunk_<c>.npz: irradiance H per light group                                (lib.formats.light_maps)
 
 settings: tolerance, relative_to, t_direct, t_indirect
 """

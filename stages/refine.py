@@ -1,4 +1,5 @@
-"""Refine the light of a chunk of surfaces on adaptive quadtrees: the direct half, or the indirect half, which reads all direct trees.
+"""Refine the light of a chunk of surfaces on adaptive quadtrees: the direct half, or the indirect half, which reads
+all direct trees.
 
 reads   scene.npz, casters.npz, solution.npz, and chunk_<c>.npz of sample (direct) or all direct_<c>.npz (indirect)
 writes  direct_<c>.npz or indirect_<c>.npz          (lib.formats.trees)
@@ -48,7 +49,15 @@ def body(args, cost):
         follows = chosen["bounces"] == "converge"
         table = lookup_table(world, direct, solved, follows)
         done = refine_indirect(
-            world, mine, table, solved, chosen["seed"], tau, chosen["top"], chosen["base_indirect"], chosen["gather_rays"]
+            world,
+            mine,
+            table,
+            solved,
+            chosen["seed"],
+            tau,
+            chosen["top"],
+            chosen["base_indirect"],
+            chosen["gather_rays"],
         )
     trees.save(args.out, args.half, {int(s): stored(t, world.n_groups) for s, t in done.items()}, cost.notes)
     cost.rays = world.tracer.rays
@@ -59,7 +68,12 @@ def unpacked(x, world):
     out = {}
     for k, s in enumerate(x.surface):
         part, shape = slice(x.first[k], x.first[k + 1]), world.lattices[s].shape(x.level[k])
-        out[int(s)] = x.value[part].reshape(*shape, -1), x.hidden[part].reshape(shape), x.noise[part].reshape(shape), int(x.level[k])
+        out[int(s)] = (
+            x.value[part].reshape(*shape, -1),
+            x.hidden[part].reshape(shape),
+            x.noise[part].reshape(shape),
+            int(x.level[k]),
+        )
     return out
 
 

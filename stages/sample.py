@@ -45,8 +45,10 @@ def body(args, cost):
 def packed(surfaces, base, lit, elements, grids, groups):
     """Samples from per-surface pieces."""
     lattices, levels = [base[s][:3] for s in surfaces], [base[s][3] for s in surfaces]
-    fields = [np.concatenate([np.zeros((0, *a[0].shape[2:]), a[0].dtype), *(x.reshape(-1, *x.shape[2:]) for x in a)])
-              for a in zip(*lattices, strict=True)] or [np.zeros((0, 3 * groups), np.float32), np.zeros(0, bool), np.zeros(0, np.float32)]
+    fields = [
+        np.concatenate([np.zeros((0, *a[0].shape[2:]), a[0].dtype), *(x.reshape(-1, *x.shape[2:]) for x in a)])
+        for a in zip(*lattices, strict=True)
+    ] or [np.zeros((0, 3 * groups), np.float32), np.zeros(0, bool), np.zeros(0, np.float32)]
     rows = [e.rows for e in elements]
     width = rows[0].entries.shape[1] if rows else 1
     return samples.Samples(
@@ -54,7 +56,9 @@ def packed(surfaces, base, lit, elements, grids, groups):
         np.array(levels, dtype=np.int32),
         np.cumsum([0, *(x[1].size for x in lattices)]),
         *fields,
-        np.concatenate([np.zeros(0, np.int32), *(np.arange(grids.first[s], grids.first[s + 1], dtype=np.int32) for s in lit)]),
+        np.concatenate(
+            [np.zeros(0, np.int32), *(np.arange(grids.first[s], grids.first[s + 1], dtype=np.int32) for s in lit)]
+        ),
         np.concatenate([np.zeros((0, width), np.int32), *(r.entries for r in rows)]),
         np.concatenate([np.zeros((0, 16), bool), *(r.is_hidden for r in rows)]),
         np.concatenate([np.zeros(0), *(e.area for e in elements)]),

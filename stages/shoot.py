@@ -1,4 +1,5 @@
-"""Solve the bounced light of the elements: progressive refinement, then gather sweeps over the same rows.  Casts no ray.
+"""Solve the bounced light of the elements: progressive refinement, then gather sweeps over the same rows.  Casts no
+ray.
 
 reads   scene.npz, casters.npz, chunk_<c>.npz of sample, the reflectances        (lib.formats.scene, .casters, .samples)
 writes  solution.npz                                                             (lib.formats.solution)
@@ -41,7 +42,9 @@ def body(args, cost):
     try:
         found = solve(H_direct, rho[surface], area, F, chosen["convergence"], bounces)
     except DoesNotConverge as error:
-        raise Refusal(f"the light does not converge: {error}; lower the reflectances or set bounces to a number") from None
+        raise Refusal(
+            f"the light does not converge: {error}; lower the reflectances or set bounces to a number"
+        ) from None
     watts = mesh.scale**2
     total = max(area.sum(), 1e-300)
     weighted = found.H.sum(axis=1) * area[:, None]
@@ -56,8 +59,17 @@ def body(args, cost):
         args.out,
         solution.Solution(
             np.maximum(found.H - H_direct, 0).astype(np.float32),
-            share.astype(np.float32), F.spread(found.H.sum(axis=1) * rho[surface]).astype(np.float32),
-            found.H.sum(axis=1).max(axis=1, initial=0.0).astype(np.float32), grids.n_u, grids.n_v, rho, mean_H, H_surface, found.history, ledger, facts,
+            share.astype(np.float32),
+            F.spread(found.H.sum(axis=1) * rho[surface]).astype(np.float32),
+            found.H.sum(axis=1).max(axis=1, initial=0.0).astype(np.float32),
+            grids.n_u,
+            grids.n_v,
+            rho,
+            mean_H,
+            H_surface,
+            found.history,
+            ledger,
+            facts,
         ),
     )
 

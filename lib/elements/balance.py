@@ -1,7 +1,7 @@
 """2:1 balance of a quadtree over edges and corners.
 
-Baum et al. 1991 balance over edges; here corners count too, so that every leaf finds its eight neighbours within one level.
-A tree is a list `divided`: divided[l] is (n_v 2^l, n_u 2^l) bool, the cells of level l that have children.
+Baum et al. 1991 balance over edges; here corners count too, so that every leaf finds its eight neighbours within one
+level. A tree is a list `divided`: divided[l] is (n_v 2^l, n_u 2^l) bool, the cells of level l that have children.
 """
 
 import numpy as np

@@ -1,4 +1,6 @@
-"""Which job handles which surface: fixed by the scene and the number of chunks alone, so that every machine cuts the same chunks."""
+"""Which job handles which surface: fixed by the scene and the number of chunks alone, so that every machine cuts the
+same chunks.
+"""
 
 import numpy as np
 

@@ -1,4 +1,6 @@
-"""Element grids: the coarse uniform uv cells in which the bounced light is solved, and how they lie in one long list."""
+"""Element grids: the coarse uniform uv cells in which the bounced light is solved, and how they lie in one long
+list.
+"""
 
 from dataclasses import dataclass
 

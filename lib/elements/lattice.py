@@ -1,6 +1,7 @@
 """The uniform lattice of samples on a surface's (u, v): crossings of lines, borders included.
 
-A surface has roots n_u x n_v; level l has n_u 2^l + 1 by n_v 2^l + 1 crossings.  Arrays are indexed [j, i], row j is v = j / (h - 1).
+A surface has roots n_u x n_v; level l has n_u 2^l + 1 by n_v 2^l + 1 crossings.  Arrays are indexed [j, i], row j is
+v = j / (h - 1).
 """
 
 from dataclasses import dataclass
@@ -63,7 +64,9 @@ class Lattice:
         return any(self.closed) or any(self.collapsed)
 
     def _copies(self, shape):
-        """Crossings that repeat another, and which: two (j, i).  Of all crossings at one point the first in the array counts."""
+        """Crossings that repeat another, and which: two (j, i).  Of all crossings at one point the first in the array
+        counts.
+        """
         source = np.arange(shape[0] * shape[1]).reshape(shape)
         sides = source[:, 0], source[:, -1], source[0], source[-1]
         for _ in range(3):  # seams and poles that meet in corners hand the first on from side to side

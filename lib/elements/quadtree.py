@@ -1,10 +1,12 @@
 """An adaptive quadtree of samples over one surface's lattice: where to sample next, and when to stop.
 
-Predicate (midpoint rule): a leaf is divided if one of the five midpoints measured in its PARENT departs from the parent's bilinear
-prediction by more than tau.  At the base level, where no parent was measured, it is the contrast of the four corners.
-Hidden samples take no part in it; a leaf with hidden and visible corners lies along a contact, where light changes
-fast, and is divided for that.  A leaf that is wide beside the free space above one of its corners is divided as well, for a few levels: light
-that bounces changes within such distances (Ward et al. 1988), and a contact can lie between samples that agree.  The tree is kept balanced, and corners that balancing adds are measured like any other.
+Predicate (midpoint rule): a leaf is divided if one of the five midpoints measured in its PARENT departs from the
+parent's bilinear prediction by more than tau.  At the base level, where no parent was measured, it is the contrast of
+the four corners. Hidden samples take no part in it; a leaf with hidden and visible corners lies along a contact,
+where light changes fast, and is divided for that.  A leaf that is wide beside the free space above one of its corners
+is divided as well, for a few levels: light that bounces changes within such distances (Ward et al. 1988), and a
+contact can lie between samples that agree.  The tree is kept balanced, and corners that balancing adds are measured
+like any other.
 """
 
 import numpy as np
@@ -24,7 +26,8 @@ class Quadtree:
 
     lattice : Lattice; side : length of a root cell in the scene's frame
     level : of the arrays below, which hold the whole lattice of that level
-    value (h, w, C) float32, known, hidden (h, w) bool, noise (h, w) float32 standard error of the sample, 0 if it has none,
+    value (h, w, C) float32, known, hidden (h, w) bool, noise (h, w) float32 standard error of the sample, 0 if it has
+    none,
         reach (h, w) float32 free space above it in the scene's frame, inf where nobody asked
     divided : list of (n_v 2^l, n_u 2^l) bool for l < level
     """
@@ -47,7 +50,13 @@ class Quadtree:
 
     def put(self, at, value, hidden, noise, reach):
         """Store samples at crossings `at` (j, i): value (m, C); hidden, noise, reach (m,) or numbers."""
-        self.value[at], self.hidden[at], self.noise[at], self.reach[at], self.known[at] = value, hidden, noise, reach, True
+        self.value[at], self.hidden[at], self.noise[at], self.reach[at], self.known[at] = (
+            value,
+            hidden,
+            noise,
+            reach,
+            True,
+        )
         self._wanted[at] = False
         for array in (self.value, self.hidden, self.noise, self.reach, self.known):
             self.lattice.copy_own(array)
@@ -68,8 +77,13 @@ class Quadtree:
         return np.nonzero(doubt)
 
     def split(self, tau, top):
-        """Divide leaves above the threshold tau, up to level `top`; balance.  Returns True when new samples are wanted."""
-        divided = [*self.divided, *(np.zeros(self.lattice.cells(self.level), dtype=bool) for _ in range(self.level < top))]
+        """Divide leaves above the threshold tau, up to level `top`; balance.  Returns True when new samples are
+        wanted.
+        """
+        divided = [
+            *self.divided,
+            *(np.zeros(self.lattice.cells(self.level), dtype=bool) for _ in range(self.level < top)),
+        ]
         for level in range(self.base, len(divided)):
             cell = self.side * 2.0**-level
             if cell > SMALLEST_CELL:
@@ -127,7 +141,9 @@ class Quadtree:
         return np.where(np.isfinite(spread), spread, 0.0).max(axis=2)
 
     def residual(self, level):
-        """Largest departure of the five midpoints from bilinear prediction, for each divided cell of a level: (rows, columns)."""
+        """Largest departure of the five midpoints from bilinear prediction, for each divided cell of a level: (rows,
+        columns).
+        """
         step = 2 ** (self.level - level - 1)
         value, hidden = self.value[::step, ::step], self.hidden[::step, ::step]
         row = _departure(value[::2, ::2], hidden[::2, ::2], value[::2, 1::2], hidden[::2, 1::2], axis=1)
@@ -139,8 +155,12 @@ class Quadtree:
         worst = np.maximum.reduce([row[:-1], row[1:], column[:, :-1], column[:, 1:], centre])
         # A departure within the samples' own noise says nothing.
         noise = self.noise[::step, ::step]
-        doubt = np.maximum.reduce([noise[a : a + 2 * len(worst) : 2, b : b + 2 * worst.shape[1] : 2]
-                                   for a, b in ((0, 1), (2, 1), (1, 0), (1, 2), (1, 1))])
+        doubt = np.maximum.reduce(
+            [
+                noise[a : a + 2 * len(worst) : 2, b : b + 2 * worst.shape[1] : 2]
+                for a, b in ((0, 1), (2, 1), (1, 0), (1, 2), (1, 1))
+            ]
+        )
         return np.where(self.divided[level], np.maximum(worst - NOISE * doubt, 0.0), 0.0)
 
     def _deepen(self):

@@ -75,6 +75,6 @@ def n_chunks(settings, n_maps):
     if asked != "auto":
         return int(asked)
     q = chosen_quality(settings["bake"])
-    samples = n_maps * (2**q["base_direct"] + 1) ** 2
+    samples = n_maps * (2 ** q["base_direct"] + 1) ** 2
     rays = 3 * samples * SHADOW_RAYS + 3 * n_maps * (2 ** q["base_indirect"] + 1) ** 2 * GATHER_RAYS * q["n_elements"]
     return int(min(MOST_CHUNKS, max(1, -(-rays // RAYS_A_JOB))))

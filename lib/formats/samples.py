@@ -14,9 +14,9 @@ class Samples:
     """One chunk.
 
     surface (m,) int32 surfaces with maps, ascending; level (m,) int32, base level of their direct trees
-    first (m + 1,) int64 offsets of their lattices in value (N, 3 G) float32 [W/m^2], hidden (N,) bool, noise (N,) float32
-    element (k,) int32 global numbers; entries (k, R) int32; is_hidden (k, 16) bool; area (k,) float64 visible area in frame units;
-    H_direct (k, G, 3) float64 [W/m^2]
+    first (m + 1,) int64 offsets of their lattices in value (N, 3 G) float32 [W/m^2], hidden (N,) bool, noise (N,)
+    float32 element (k,) int32 global numbers; entries (k, R) int32; is_hidden (k, 16) bool; area (k,) float64 visible
+    area in frame units; H_direct (k, G, 3) float64 [W/m^2]
     """
 
     surface: np.ndarray

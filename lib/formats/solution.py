@@ -11,8 +11,8 @@ KIND, VERSION = "solution", 1
 
 @dataclass(frozen=True)
 class Solution:
-    """H_indirect (n, G, 3) float32 bounced irradiance of the elements >= 0 [W/m^2]; share (n,) float32 visible share, 0..1
-    spread (n,) float32 standard deviation over directions of the reflected light that each element sees [W/m^2]
+    """H_indirect (n, G, 3) float32 bounced irradiance of the elements >= 0 [W/m^2]; share (n,) float32 visible share,
+    0..1 spread (n,) float32 standard deviation over directions of the reflected light that each element sees [W/m^2]
     H_element (n,) float32 irradiance of the elements, all groups, largest channel
     n_u, n_v (surfaces,) int64 element grid of each surface; rho (surfaces, 3) float64
     mean_H (3,) area-weighted mean irradiance of the scene's elements, all groups

@@ -11,8 +11,9 @@ KIND, VERSION = "trees", 1
 
 @dataclass(frozen=True)
 class Tree:
-    """One surface's samples.  roots (n_u, n_v), level of the lattice that ji (n, 2) int32 [j, i] counts on; value (n, G, 3) float32 [W/m^2];
-    hidden (n,) bool; noise (n,) float32; leaves (m, 3) int32 (level, j, i); error: estimated RMS error [W/m^2]."""
+    """One surface's samples.  roots (n_u, n_v), level of the lattice that ji (n, 2) int32 [j, i] counts on; value (n,
+    G, 3) float32 [W/m^2]; hidden (n,) bool; noise (n,) float32; leaves (m, 3) int32 (level, j, i); error: estimated
+    RMS error [W/m^2]."""
 
     roots: tuple
     level: int

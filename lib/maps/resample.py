@@ -1,12 +1,12 @@
 """From adaptive samples to a plain bitmap: the recursive bilinear interpolation of Moeller 1996, Figures 3 and 4.
 
-From the coarsest level to the finest, over the whole map: an edge midpoint is the value measured there, else the mean of the edge's ends;
-a centre is the value measured, else from its four edge midpoints M and four corners C
+From the coarsest level to the finest, over the whole map: an edge midpoint is the value measured there, else the mean
+of the edge's ends; a centre is the value measured, else from its four edge midpoints M and four corners C
 
     centre = sum M / 2 - sum C / 4        clamped to the range of the eight
 
-The paper gives no weights; these (Coons 1967) reproduce every quadratic.  Neighbouring leaves read the same edge values, so there is no
-crack at a T-junction.  Hidden samples are passed over.
+The paper gives no weights; these (Coons 1967) reproduce every quadratic.  Neighbouring leaves read the same edge
+values, so there is no crack at a T-junction.  Hidden samples are passed over.
 """
 
 import numpy as np
@@ -15,8 +15,9 @@ import numpy as np
 def resample(value, known, hidden):
     """Fill a lattice from the samples known on it.
 
-    value (h, w, G, 3) float, known, hidden (h, w) bool; h - 1 and w - 1 share a power of two 2^l, and the crossings of level 0 are
-    known.  Returns (value, hidden): new arrays; known values are kept bit for bit; hidden marks what no visible sample reaches.
+    value (h, w, G, 3) float, known, hidden (h, w) bool; h - 1 and w - 1 share a power of two 2^l, and the crossings
+    of level 0 are known.  Returns (value, hidden): new arrays; known values are kept bit for bit; hidden marks what
+    no visible sample reaches.
     """
     value, hidden = value.copy(), hidden & known
     known = known.copy()
@@ -36,7 +37,11 @@ def _root_step(h, w):
 
 
 def _fill_edges(value, known, hidden, step, half, axis):
-    along = (slice(None, None, step), slice(half, None, step)) if axis == 1 else (slice(half, None, step), slice(None, None, step))
+    along = (
+        (slice(None, None, step), slice(half, None, step))
+        if axis == 1
+        else (slice(half, None, step), slice(None, None, step))
+    )
     v, k, s = value[along], known[along], hidden[along]
     corner, shade = value[::step, ::step], hidden[::step, ::step]
     a, b = (corner[:, :-1], corner[:, 1:]) if axis == 1 else (corner[:-1], corner[1:])
@@ -99,7 +104,8 @@ def upsample(value, hidden, levels):
 
 
 def drop_levels(value, hidden, level, tolerance):
-    """Drop the deepest levels whose visible samples all lie within `tolerance` of their bilinear prediction from the rest.
+    """Drop the deepest levels whose visible samples all lie within `tolerance` of their bilinear prediction from the
+    rest.
 
     value (h, w, G, 3), the sum over groups decides.  Returns (value, hidden, level); level 0 is the root grid.
     """

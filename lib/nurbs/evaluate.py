@@ -77,8 +77,8 @@ def _project(A, A_u, A_v):
 
 def evaluate_grid(surface, u, v):
     """Points and derivatives on the grid of u (m,) and v (k,): S, S_u, S_v, each (k, m, 3), row j is v[j]."""
-    N, dN = (_dense(surface.knots_u, surface.degree_u, surface.Pw.shape[0], u))
-    M, dM = (_dense(surface.knots_v, surface.degree_v, surface.Pw.shape[1], v))
+    N, dN = _dense(surface.knots_u, surface.degree_u, surface.Pw.shape[0], u)
+    M, dM = _dense(surface.knots_v, surface.degree_v, surface.Pw.shape[1], v)
     rows, rows_v = np.einsum("jb,abc->jac", M, surface.Pw), np.einsum("jb,abc->jac", dM, surface.Pw)
     return _project(N @ rows, dN @ rows, N @ rows_v)
 

@@ -4,8 +4,8 @@ For emitter l, points y_k on it, D_k = y_k - x, g_k = cos cos' / r^2, V_k = 1 wh
 
     H_l = E_l F_l (sum g_k V_k) / (sum g_k)
 
-The ratio is exact where all V_k = 1.  Points lie on the facets in proportion to their form factors, so w_k = g_k / density stands for g_k.
-If the first n0 points agree they decide; otherwise n1 are taken.
+The ratio is exact where all V_k = 1.  Points lie on the facets in proportion to their form factors, so w_k = g_k /
+density stands for g_k. If the first n0 points agree they decide; otherwise n1 are taken.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ BATCH = 4096  # samples at once
 @dataclass(frozen=True)
 class DirectLight:
     """H (n, G, 3) float32 irradiance; noise (n,) float32 its standard error, > 0 where an emitter is partly blocked;
-     pairs (sample, emitter) that needed none: below the horizon, and dim."""
+    pairs (sample, emitter) that needed none: below the horizon, and dim."""
 
     H: np.ndarray
     noise: np.ndarray
@@ -83,7 +83,9 @@ def _batch(x, N, shift, points, emitters, n_groups, tracer, face_surface, n0):
             x[asked], N[asked], shift[asked], l[asked], asked, points, n0, walk, emitters, tracer, face_surface
         )
         largest = emitters.E[l[asked]].max(axis=1) * F_emitter[row[asked], l[asked]]
-        variance[asked] += np.where(partly, (NOISE * largest) ** 2 * V[asked] * (1 - V[asked]), 0.0) / len(points) ** 1.5
+        variance[asked] += (
+            np.where(partly, (NOISE * largest) ** 2 * V[asked] * (1 - V[asked]), 0.0) / len(points) ** 1.5
+        )
         agreed += int((~partly).sum())
         V[~lit] = 0.0
         share = F_emitter[row, l] * V
@@ -138,7 +140,9 @@ def _probe(x, N, shift, l, row, points, walk, emitters, tracer, face_surface):
     cast = w > 0
     blocked = np.zeros(w.shape, dtype=bool)
     origins = np.repeat(np.ascontiguousarray(x, dtype=np.float32), len(points), axis=0)[cast.ravel()]
-    blocked[cast] = _is_blocked(origins, D[cast], np.broadcast_to(l[:, None], w.shape)[cast], emitters, tracer, face_surface)
+    blocked[cast] = _is_blocked(
+        origins, D[cast], np.broadcast_to(l[:, None], w.shape)[cast], emitters, tracer, face_surface
+    )
     return np.where(blocked, 0.0, w).sum(axis=1), w.sum(axis=1)
 
 
@@ -183,7 +187,9 @@ class _FacetChoice:
         return facet, np.clip(left, 0.0, 1 - 1e-9)
 
     def inverse_density(self, row, l, facet):
-        """Area of the facet over the probability of choosing it: what turns g into w; 1 for single facets (it cancels)."""
+        """Area of the facet over the probability of choosing it: what turns g into w; 1 for single facets (it
+        cancels).
+        """
         if self._is_single:
             return 1.0
         F = self._F[row[:, None], facet]

@@ -1,7 +1,7 @@
 """Emitting surfaces as flat facets: what direct light is computed from.
 
-A flat parallelogram is one facet.  A curved emitter is triangles over a uv grid fine enough for its shape; each carries the exact area
-of its piece of surface, so the power is that of the exact surface.
+A flat parallelogram is one facet.  A curved emitter is triangles over a uv grid fine enough for its shape; each
+carries the exact area of its piece of surface, so the power is that of the exact surface.
 """
 
 from dataclasses import dataclass
@@ -109,7 +109,9 @@ def _cells(surface):
 
 
 def _is_bent(surface):
-    return surface.degree_u > 1 or surface.degree_v > 1 or surface.Pw.shape[:2] != (2, 2) or not shape.is_planar(surface)
+    return (
+        surface.degree_u > 1 or surface.degree_v > 1 or surface.Pw.shape[:2] != (2, 2) or not shape.is_planar(surface)
+    )
 
 
 def _cell_areas(surface, u, v, order=4):
@@ -126,7 +128,8 @@ def _cell_areas(surface, u, v, order=4):
 def gather_emitters(surfaces, flip, E, group):
     """Emitters of a scene.
 
-    surfaces : list of n NurbsSurface in the scene's frame; flip (n,) bool; E (n, 3) exitance, an emitter is E > 0; group (n,) int.
+    surfaces : list of n NurbsSurface in the scene's frame; flip (n,) bool; E (n, 3) exitance, an emitter is E > 0;
+    group (n,) int.
     """
     lit = np.flatnonzero(np.asarray(E).max(axis=1, initial=0.0) > 0)
     parts = [facets_of(surfaces[s], bool(flip[s])) for s in lit]

@@ -13,8 +13,8 @@ NO_EDGE = 1e-30  # |v_k x v_k+1| below this: the edge is a point or seen end-on
 def form_factor_disc(D, n, n_facet, area):
     """F = A cos cos' / (pi r^2 + A) for facets at D = centre - x.
 
-    D (..., 3), n and n_facet broadcastable unit normals of receiver and facet, area (...): returns (...), 0 where either
-    looks away.
+    D (..., 3), n and n_facet broadcastable unit normals of receiver and facet, area (...): returns (...), 0 where
+    either looks away.
     """
     r2 = np.einsum("...c,...c->...", D, D)
     cos_x = np.einsum("...c,...c->...", D, n)

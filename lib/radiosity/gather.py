@@ -2,11 +2,12 @@
 
     H_indirect(x) = 1/K sum over K cosine rays of  rho_s [H_indirect(s, u, v) + H_direct(s, u, v)]  at the hit
 
-Two-pass radiosity (Lischinski et al. 1993): H_direct from the fine direct maps, H_indirect from the elements; never emission; nothing from
-misses, back faces and surfaces without elements.
+Two-pass radiosity (Lischinski et al. 1993): H_direct from the fine direct maps, H_indirect from the elements; never
+emission; nothing from misses, back faces and surfaces without elements.
 
-A hit nearer than the elements there are wide can not be told from its neighbours by them: near a contact they know only the mean of what
-is lit and what is not.  There one more cosine ray stands for H_indirect, and so on while hits stay near (Jensen 1996, final gathering).
+A hit nearer than the elements there are wide can not be told from its neighbours by them: near a contact they know
+only the mean of what is lit and what is not.  There one more cosine ray stands for H_indirect, and so on while hits
+stay near (Jensen 1996, final gathering).
 """
 
 from dataclasses import dataclass
@@ -27,8 +28,9 @@ NOISE = 1.35  # measured: standard error of K rays over their standard deviation
 
 @dataclass(frozen=True)
 class RadiosityMap:
-    """Reflected radiosity of one surface for lookups: value (h, w, C) float32 of all light, direct (h, w, C) of direct light alone,
-    weight (h, w), 0 where hidden; rho (C,); width, mean side of its elements in the scene's frame."""
+    """Reflected radiosity of one surface for lookups: value (h, w, C) float32 of all light, direct (h, w, C) of
+    direct light alone, weight (h, w), 0 where hidden; rho (C,); width, mean side of its elements in the scene's
+    frame."""
 
     value: np.ndarray
     direct: np.ndarray
@@ -40,8 +42,8 @@ class RadiosityMap:
 def radiosity_map(H_direct, hidden, H_element, share, grid, rho, closed, area):
     """rho (H_direct + H_indirect) on the lattice of a direct map.
 
-    H_direct (h, w, G, 3), hidden (h, w); H_element (n_v n_u, G, 3) indirect, share (n_v n_u,) visible share, grid (n_u, n_v), rho (3,),
-    area of the surface in the scene's frame.
+    H_direct (h, w, G, 3), hidden (h, w); H_element (n_v n_u, G, 3) indirect, share (n_v n_u,) visible share, grid
+    (n_u, n_v), rho (3,), area of the surface in the scene's frame.
     """
     h, w, G = H_direct.shape[:3]
     u, v = np.linspace(0, 1, w), np.linspace(0, 1, h)

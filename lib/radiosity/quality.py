@@ -15,8 +15,8 @@ from dataclasses import asdict, dataclass
 
 @dataclass(frozen=True)
 class Quality:
-    """n_elements in the scene and rays_per_element for their rows; gather_rays K; shadow_rays (n0, n1), the same for every
-    tolerance at first_shadow_rays, which the elements see;
+    """n_elements in the scene and rays_per_element for their rows; gather_rays K; shadow_rays (n0, n1), the same for
+    every tolerance at first_shadow_rays, which the elements see;
     thresholds t_direct, t_indirect in units of the scene's mean irradiance; levels of the two trees (base, top)."""
 
     n_elements: int
@@ -38,7 +38,8 @@ class Quality:
 def quality(tolerance, max_level=8):
     """Quality for a relative RMS error `tolerance` (0.002 .. 0.1) with trees at most `max_level` deep.
 
-    The number of elements changes in steps, so that most changes of the tolerance leave the solved elements as they are.
+    The number of elements changes in steps, so that most changes of the tolerance leave the solved elements as they
+    are.
     """
     ratio = tolerance / 0.01
     elements = 4000 if tolerance >= 0.0075 else 16000 if tolerance >= 0.004 else 40000

@@ -19,7 +19,8 @@ def refine(world, trees, sample, seed, tau, top, recheck=None):
     """Measure and divide until every leaf is within its threshold.
 
     trees : {surface: Quadtree}, whose wanted() samples are missing
-    sample(points) -> value (n, C), hidden, noise, reach (n,); recheck: the same with more effort, for doubtful() samples
+    sample(points) -> value (n, C), hidden, noise, reach (n,); recheck: the same with more effort, for doubtful()
+    samples
     tau : {surface: threshold [W/m^2]}; top : deepest level.  Works on the trees in place.
     """
     active = sorted(trees)
@@ -72,11 +73,18 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
 
     solution : has spread, H_element, n_u, n_v, first; K gather rays for a large cell of usual surroundings.
     """
-    trees = {s: Quadtree(world.lattices[s], world.base_level(s, level), world.channels, world.side(s)) for s in surfaces}
+    trees = {
+        s: Quadtree(world.lattices[s], world.base_level(s, level), world.channels, world.side(s)) for s in surfaces
+    }
 
     def sample(points):
         n = len(points.x)
-        out = np.zeros((n, world.channels), np.float32), np.zeros(n, bool), np.zeros(n, np.float32), np.zeros(n, np.float32)
+        out = (
+            np.zeros((n, world.channels), np.float32),
+            np.zeros(n, bool),
+            np.zeros(n, np.float32),
+            np.zeros(n, np.float32),
+        )
         rays = rays_for(points.cell, contrast_at(points, solution), K)
         for k in np.unique(rays):
             of = np.flatnonzero(rays == k)
@@ -94,8 +102,8 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
 def rays_for(cell, contrast, K):
     """Gather rays of samples: K for cells of LARGE_CELL where the light around varies by USUAL_CONTRAST.
 
-    cell, contrast (n,).  With variance ~ contrast^2 rays^-1.6, the sum of area x variance is least for a given number of rays when
-    rays ~ (area contrast^2)^(1/2.6).  Rounded to sizes that share a batch.
+    cell, contrast (n,).  With variance ~ contrast^2 rays^-1.6, the sum of area x variance is least for a given number
+    of rays when rays ~ (area contrast^2)^(1/2.6).  Rounded to sizes that share a batch.
     """
     need = K * np.minimum(1.0, cell / LARGE_CELL) ** (2 / 2.6) * (contrast / USUAL_CONTRAST) ** (2 / 2.6)
     need = np.clip(need, max(LEAST_RAYS, K / 8), 4 * K)
@@ -105,14 +113,17 @@ def rays_for(cell, contrast, K):
 def contrast_at(points, solution):
     """How much the light around varies over directions, by the element each point lies in: (n,).
 
-    The spread, in units of the irradiance between the element's own and the scene's mean (the geometric mean of both): an error is seen
-    beside its surroundings, but counts less where there is little light.  The scene's mean where a surface has no elements.
+    The spread, in units of the irradiance between the element's own and the scene's mean (the geometric mean of
+    both): an error is seen beside its surroundings, but counts less where there is little light.  The scene's mean
+    where a surface has no elements.
     """
     s = points.surface
     n_u, n_v = solution.n_u[s], solution.n_v[s]
     if not len(solution.spread):
         return np.full(len(s), USUAL_CONTRAST)
-    H = np.sqrt(np.maximum(solution.H_element, 1e-12 * solution.H_element.max()) * max(solution.H_element.mean(), 1e-300))
+    H = np.sqrt(
+        np.maximum(solution.H_element, 1e-12 * solution.H_element.max()) * max(solution.H_element.mean(), 1e-300)
+    )
     contrast = solution.spread / np.maximum(H, 1e-300)
     i = np.minimum((points.uv[:, 0] * n_u).astype(np.int64), n_u - 1)
     j = np.minimum((points.uv[:, 1] * n_v).astype(np.int64), n_v - 1)
@@ -134,22 +145,33 @@ def lookup_table(world, direct, solution, follows_near=True):
         grid = int(solution.n_u[s]), int(solution.n_v[s])
         closed = world.lattices[s].closed
         maps[int(s)] = radiosity_map(
-            value, hidden, solution.H_indirect[part], solution.share[part], grid, solution.rho[s], closed,
+            value,
+            hidden,
+            solution.H_indirect[part],
+            solution.share[part],
+            grid,
+            solution.rho[s],
+            closed,
             world.casters.area[s] * follows_near,
         )
     return LookupTable(maps, world.mesh, world.n, world.channels)
 
 
 def error_of(tree):
-    """Estimated RMS error of a tree's map [W/m^2]: sampling noise, and what the leaves still depart from their prediction."""
+    """Estimated RMS error of a tree's map [W/m^2]: sampling noise, and what the leaves still depart from their
+    prediction.
+    """
     seen = tree.known & ~tree.hidden
     noise = AVERAGED * float(np.sqrt((tree.noise[seen].astype(np.float64) ** 2).mean())) if seen.any() else 0.0
     departure, cells = 0.0, 0
     for level in range(max(tree.base - 1, 0), tree.level):
-        last = tree.divided[level] if level + 1 >= len(tree.divided) else tree.divided[level] & ~parents(tree.divided[level + 1])
+        last = (
+            tree.divided[level]
+            if level + 1 >= len(tree.divided)
+            else tree.divided[level] & ~parents(tree.divided[level + 1])
+        )
         size = 4.0 ** (tree.level - level)
         departure += float((tree.residual(level)[last].astype(np.float64) ** 2).sum()) * size
         cells += last.sum() * size
     interpolation = SMOOTH * np.sqrt(departure / cells) if cells else 0.0
     return float(np.hypot(noise, interpolation))
-

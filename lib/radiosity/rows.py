@@ -41,7 +41,7 @@ def element_rows(x, N, shift, R, tracer, mesh, grids):
     for first in range(0, m, BATCH):
         part = slice(first, first + BATCH)
         k = len(x[part])
-        # Ray number r leaves from point r mod 16, so that every point gets a stretch of the sequence in every direction.
+        # Ray r leaves from point r mod 16, so that every point gets a stretch of the sequence in every direction.
         normals = N[part].reshape(-1, 3)
         D = np.empty((k, points, per_point, 3), dtype=np.float32)
         for p in range(points):

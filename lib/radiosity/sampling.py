@@ -17,8 +17,8 @@ from lib.visibility.qmc import shift, stream
 
 @dataclass(frozen=True)
 class Points:
-    """Samples of several surfaces in one batch: surface (n,), cell (n,) side of the lattice's cells in the scene's frame,
-    uv (n, 2) in [0, 1], x, N (n, 3) lifted, shift (n, 2)."""
+    """Samples of several surfaces in one batch: surface (n,), cell (n,) side of the lattice's cells in the scene's
+    frame, uv (n, 2) in [0, 1], x, N (n, 3) lifted, shift (n, 2)."""
 
     surface: np.ndarray
     cell: np.ndarray
@@ -35,7 +35,9 @@ def points_at(world, seed, wanted, level_of):
     """
     parts = []
     for s, (j, i) in wanted.items():
-        x, N = receivers(world.surface(s), world.scene.flip[s], world.casters.sag[s], world.lattices[s], level_of[s], j, i)
+        x, N = receivers(
+            world.surface(s), world.scene.flip[s], world.casters.sag[s], world.lattices[s], level_of[s], j, i
+        )
         up = 2 ** (FINEST - level_of[s])
         cell = np.full(len(j), world.side(s) * 2.0 ** -level_of[s])
         h, w = world.lattices[s].shape(level_of[s])
@@ -47,7 +49,14 @@ def points_at(world, seed, wanted, level_of):
 def direct_at(world, points, shadow_rays):
     """Direct light at points: DirectLight, and which are hidden (only those that no light reaches can be)."""
     light = direct_light(
-        points.x, points.N, points.shift, world.emitters, world.n_groups, world.tracer, world.mesh.face_surface, *shadow_rays
+        points.x,
+        points.N,
+        points.shift,
+        world.emitters,
+        world.n_groups,
+        world.tracer,
+        world.mesh.face_surface,
+        *shadow_rays,
     )
     hidden = np.zeros(len(points.x), dtype=bool)
     dark = np.flatnonzero(light.H.max(axis=(1, 2), initial=0.0) <= 0)
@@ -57,7 +66,8 @@ def direct_at(world, points, shadow_rays):
 
 
 def base_lattice(world, surfaces, seed, level, shadow_rays):
-    """Direct light on the base lattices: {surface: (value (h, w, 3 G), hidden, noise (h, w), level)} and DirectLight's counts.
+    """Direct light on the base lattices: {surface: (value (h, w, 3 G), hidden, noise (h, w), level)} and
+    DirectLight's counts.
 
     level : of large surfaces; smaller ones begin coarser.
     """

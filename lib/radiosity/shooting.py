@@ -7,11 +7,12 @@ Cohen et al. 1988 in batches (Southwell's method, Gortler et al. 1994), overshoo
     H_j += x_i F_ij area_i / area_j,  dB_j += rho_j (the same),  dB_i -= x_i
     A_amb = k / (1 - k rho_avg) sum dB_j area_j / sum area,   k the share of rays that meet an element
 
-k is ours (the source is for closed rooms, k = 1): in an open scene most light never comes back, and overshooting as if it
-did makes the unshot light swing for ever.
+k is ours (the source is for closed rooms, k = 1): in an open scene most light never comes back, and overshooting as
+if it did makes the unshot light swing for ever.
 
 then  H_i = H_direct,i + sum_j F_ij rho_j H_j  until the change, summed as a geometric series, is small.
-Shooting deposits light through single rays, and small elements collect noise that feeds back; the sweeps take it out again.
+Shooting deposits light through single rays, and small elements collect noise that feeds back; the sweeps take it out
+again.
 """
 
 from dataclasses import dataclass
@@ -32,9 +33,9 @@ class DoesNotConverge(ValueError):
 
 @dataclass(frozen=True)
 class Solution:
-    """H (n, G, 3) irradiance of each element, direct and bounced; ambient (G, 3) the preview's ambient term at the end of shooting;
-    history (rounds, 2) shots so far and unshot share of the direct light's first reflection; ledger of powers [W in frame units],
-    each (G, 3): received, absorbed, escaped, unshot, residue; shots, sweeps."""
+    """H (n, G, 3) irradiance of each element, direct and bounced; ambient (G, 3) the preview's ambient term at the
+    end of shooting; history (rounds, 2) shots so far and unshot share of the direct light's first reflection; ledger
+    of powers [W in frame units], each (G, 3): received, absorbed, escaped, unshot, residue; shots, sweeps."""
 
     H: np.ndarray
     ambient: np.ndarray
@@ -45,7 +46,9 @@ class Solution:
 
 
 class FormFactors:
-    """The sparse matrix F of rows with entries; escaped, absorbed (n,) the shares that meet no element, met (n,) others."""
+    """The sparse matrix F of rows with entries; escaped, absorbed (n,) the shares that meet no element, met (n,)
+    others.
+    """
 
     def __init__(self, entries):
         n, R = entries.shape

@@ -1,4 +1,6 @@
-"""A scene ready for light: surfaces in the scene's frame, their lattices, emitters, and the tracer over the caster mesh."""
+"""A scene ready for light: surfaces in the scene's frame, their lattices, emitters, and the tracer over the caster
+mesh.
+"""
 
 from functools import cached_property
 
@@ -13,9 +15,9 @@ from lib.radiosity.emitters import gather_emitters
 from lib.visibility.mesh_lookup import MeshLookup
 from lib.visibility.tracer import Tracer
 
-FINEST = 10  # lattice positions are hashed on this level's lattice: a crossing draws the same rays at whatever level it is met
+FINEST = 10  # positions are hashed on this level's lattice: a crossing draws the same rays at whatever level it is met
 LARGE = 0.25  # root cells from this side on, in the scene's largest side, start their trees in full
-TURN = 0.6  # radians between the normals of neighbouring base samples: more, and light that depends on direction is missed
+TURN = 0.6  # radians between normals of neighbouring base samples: beyond, light that depends on direction is missed
 
 
 def _steepest(N):
@@ -56,7 +58,9 @@ class World:
         return float(max(self.casters.extent[s])) / max(self.lattices[s].roots)
 
     def base_level(self, s, level):
-        """Level at which the trees of surface s begin: `level` on large surfaces, less on small ones as far as they are flat."""
+        """Level at which the trees of surface s begin: `level` on large surfaces, less on small ones as far as they
+        are flat.
+        """
         least = int(np.clip(level + np.round(np.log2(self.side(s) / LARGE)), 1, level))
         if self.casters.is_planar[s] or least == level:
             return least

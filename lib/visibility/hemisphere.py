@@ -1,7 +1,7 @@
 """Cosine-distributed directions about normals.
 
-Malley's method (Shirley 1991): a uniform point of the disc, lifted to the hemisphere, has density cos / pi.  The tangent frame is
-that of Duff et al. 2017, which has no singular direction.
+Malley's method (Shirley 1991): a uniform point of the disc, lifted to the hemisphere, has density cos / pi.  The
+tangent frame is that of Duff et al. 2017, which has no singular direction.
 """
 
 import numpy as np

@@ -19,7 +19,9 @@ def is_hidden(is_back, in_shell, cast=None):
 
 
 def are_buried(x, N, shift, tracer, mesh):
-    """(n,) bool: the points x (n, 3), lifted, with normals N and shifts (n, 2), are hidden, judged by RAYS rays each."""
+    """(n,) bool: the points x (n, 3), lifted, with normals N and shifts (n, 2), are hidden, judged by RAYS rays
+    each.
+    """
     out = np.zeros(len(x), dtype=bool)
     sequence = r2(RAYS)
     for first in range(0, len(x), AT_ONCE):

@@ -6,7 +6,8 @@ import numpy as np
 class MeshLookup:
     """Per-face tables over the caster mesh.
 
-    V (n_v, 3);  face_surface (m,) int; UV (n_v, 2); F (m, 3); shell (n,) int, -1 where the surface belongs to no closed shell.
+    V (n_v, 3);  face_surface (m,) int; UV (n_v, 2); F (m, 3); shell (n,) int, -1 where the surface belongs to no
+    closed shell.
     """
 
     def __init__(self, V, F, UV, face_surface, shell):
@@ -23,7 +24,9 @@ class MeshLookup:
         return self._is_shell[face]
 
     def element_of(self, hits, grids):
-        """Element number of each hit (n,) int32; -1 where nothing was met, -2 on back faces and surfaces without elements."""
+        """Element number of each hit (n,) int32; -1 where nothing was met, -2 on back faces and surfaces without
+        elements.
+        """
         met = hits.face >= 0
         face = np.where(met, hits.face, 0)
         if not len(self.face_surface):
@@ -39,7 +42,8 @@ class MeshLookup:
         return np.where(met, element, -1).astype(np.int32)
 
     def texel_coordinates(self, width, height):
-        """Faces in texel units of their surface's map: (m + 1, 6) float32 rows s, t, ds_a, dt_a, ds_b, dt_b; the last is zero.
+        """Faces in texel units of their surface's map: (m + 1, 6) float32 rows s, t, ds_a, dt_a, ds_b, dt_b; the last
+        is zero.
 
         width, height (n,) texels of each surface's map.
         """

@@ -1,7 +1,7 @@
 """Low-discrepancy points and one random shift per sample, so that any chunk of the scene draws the same rays.
 
-R2: Roberts 2018, the additive recurrence of the plastic number.  Shift: Cranley, Patterson 1976.  Hash: the finaliser of SplitMix64
-(Steele, Lea, Flood 2014).
+R2: Roberts 2018, the additive recurrence of the plastic number.  Shift: Cranley, Patterson 1976.  Hash: the finaliser
+of SplitMix64 (Steele, Lea, Flood 2014).
 """
 
 import hashlib
@@ -34,7 +34,9 @@ def fibonacci(n):
 
 
 def weyl(n, first=1):
-    """Points of another additive recurrence, steps sqrt 2 and sqrt 3: the second pair of coordinates of a path beside r2."""
+    """Points of another additive recurrence, steps sqrt 2 and sqrt 3: the second pair of coordinates of a path beside
+    r2.
+    """
     k = np.arange(first, first + n, dtype=np.float64)
     return (k[:, None] * np.sqrt([2.0, 3.0])) % 1.0
 
@@ -46,7 +48,9 @@ def stream(seed, name):
 
 
 def shift(key, i, j):
-    """A uniform point of [0, 1)^2 for each lattice position i, j (m,), from the surface's key (int or (m,) uint64): (m, 2)."""
+    """A uniform point of [0, 1)^2 for each lattice position i, j (m,), from the surface's key (int or (m,) uint64):
+    (m, 2).
+    """
     with np.errstate(over="ignore"):
         state = np.asarray(key, dtype=np.uint64) + np.asarray(i).astype(np.uint64) * np.uint64(0x9E3779B97F4A7C15)
         state = _mix(state) + np.asarray(j).astype(np.uint64) * np.uint64(0xD1B54A32D192ED03)

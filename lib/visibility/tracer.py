@@ -1,8 +1,8 @@
 """Rays against the triangles of the shadow casters.  The one importer of embreex.
 
-Measured on 103 k triangles, one core: embreex 3.0 M closest hits and 6 M occlusions a second, open3d's RaycastingScene the same to
-10 %, both on Embree; but open3d takes 1.0 CPU s to start and embreex 0.05 s, and a bake has several ray jobs.
-Robust mode: no ray slips through an edge or vertex.
+Measured on 103 k triangles, one core: embreex 3.0 M closest hits and 6 M occlusions a second, open3d's
+RaycastingScene the same to 10 %, both on Embree; but open3d takes 1.0 CPU s to start and embreex 0.05 s, and a bake
+has several ray jobs. Robust mode: no ray slips through an edge or vertex.
 """
 
 from dataclasses import dataclass
@@ -18,8 +18,9 @@ MISSED = np.float32(1e37)
 
 @dataclass(frozen=True)
 class Hits:
-    """Closest hits of n rays: face (n,) int32, -1 where nothing; a, b (n,) float32 barycentric weights of the face's second and
-    third vertex; is_back (n,) bool, the ray arrives from behind the face; t (n,) float32 in units of the direction, 1e37 on a miss."""
+    """Closest hits of n rays: face (n,) int32, -1 where nothing; a, b (n,) float32 barycentric weights of the face's
+    second and third vertex; is_back (n,) bool, the ray arrives from behind the face; t (n,) float32 in units of the
+    direction, 1e37 on a miss."""
 
     face: np.ndarray
     a: np.ndarray

@@ -108,14 +108,19 @@ def test_corners_of_every_leaf_are_known_and_t_vertices_too():
 
 
 def test_hidden_samples_take_no_part():
-    """A buried half with values of its own: its values divide nothing, only the contact along its rim does, down to CONTACT_CELL."""
+    """A buried half with values of its own: its values divide nothing, only the contact along its rim does, down to
+    CONTACT_CELL.
+    """
 
     def buried(u, v):
         return u > 0.5
 
-    tree = grown(lambda u, v: np.where(buried(u, v), 1e6, 1.0), tau=0.1, top=5, hidden=buried, base=2, side=4 * CONTACT_CELL)
+    def field(u, v):
+        return np.where(buried(u, v), 1e6, 1.0)
+
+    tree = grown(field, tau=0.1, top=5, hidden=buried, base=2, side=4 * CONTACT_CELL)
     assert tree.level == 2
-    rim = grown(lambda u, v: np.where(buried(u, v), 1e6, 1.0), tau=0.1, top=5, hidden=buried, base=2, side=16 * CONTACT_CELL)
+    rim = grown(field, tau=0.1, top=5, hidden=buried, base=2, side=16 * CONTACT_CELL)
     picture = np.array([[int(c) for c in row] for row in drawing(rim)])
     assert rim.level == 4 and (picture[:, 8] == 4).all() and (picture[:, 0] == 2).all() and (picture[:, -1] == 2).all()
     assert grown(lambda u, v: np.where(buried(u, v), 1e6, 1.0), tau=0.1, top=5, base=2).level == 5
