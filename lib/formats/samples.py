@@ -55,6 +55,10 @@ def save(path, x):
 
 def load(path):
     """Read a chunk; ArtefactError when it is damaged."""
-    x = Samples(**artefact.read(path, KIND, VERSION)[1])
-    check(x)
+    arrays = artefact.read(path, KIND, VERSION)[1]
+    try:
+        x = Samples(**arrays)
+        check(x)
+    except (TypeError, ValueError, IndexError) as error:
+        raise artefact.ArtefactError(f"{path}: damaged ({error}); delete it to have it made again") from None
     return x

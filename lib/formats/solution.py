@@ -61,6 +61,9 @@ def save(path, x):
 def load(path):
     """Read the solution; ArtefactError when it is damaged."""
     header, arrays = artefact.read(path, KIND, VERSION)
-    x = Solution(ledger=header["ledger"], facts=header["facts"], **arrays)
-    check(x)
+    try:
+        x = Solution(ledger=header["ledger"], facts=header["facts"], **arrays)
+        check(x)
+    except (KeyError, TypeError, ValueError, IndexError) as error:
+        raise artefact.ArtefactError(f"{path}: damaged ({error}); delete it to have it made again") from None
     return x

@@ -62,9 +62,17 @@ def save(path, half, trees, facts):
 
 def load(path, half):
     """Read a chunk: ({surface: Tree}, facts).  ArtefactError when it is damaged or of the other half."""
-    header, a = artefact.read(path, KIND, VERSION)
-    if header["half"] != half:
-        raise artefact.ArtefactError(f"{path}: holds {header['half']} trees, expected {half}")
+    header, arrays = artefact.read(path, KIND, VERSION)
+    try:
+        found, facts, trees = header["half"], header["facts"], _unpacked(arrays)
+    except (KeyError, IndexError, TypeError) as error:
+        raise artefact.ArtefactError(f"{path}: damaged ({error}); delete it to have it made again") from None
+    if found != half:
+        raise artefact.ArtefactError(f"{path}: holds {found} trees, expected {half}")
+    return trees, facts
+
+
+def _unpacked(a):
     trees = {}
     for k, s in enumerate(a["surface"]):
         samples = slice(a["first_sample"][k], a["first_sample"][k + 1])
@@ -79,4 +87,4 @@ def load(path, half):
             a["leaves"][leaves],
             float(a["error"][k]),
         )
-    return trees, header["facts"]
+    return trees
