@@ -1,87 +1,205 @@
-"""Error against seconds on the reference scenes, by whole bakes: `make bench`, or python benchmarks/run.py --help.
+"""Error against CPU seconds on the two reference scenes, ours and the peers', in one run: `make bench`.
 
-Each row is one bake up to its illumination maps, from a clean folder: CPU seconds and rays of all its jobs, and the
-irradiance of the maps against the path traced one at the reference points (benchmarks/reference/README.md):
+Ours: whole bakes from an empty folder through Snakemake, every process counted (user + system); `package` and
+`report`, which make the files people open and not the light, are counted apart.  The irradiance is that of
+maps/*.exr, B over rho_avg, read bilinearly at the reference points (benchmarks/reference/README.md); points on the
+lights are none.  Run k of --repeat takes seed k, the table is medians.
 
-    RMSE = sqrt(mean over points and channels of (H - E)^2 - se^2) / mean E;   95 % = that percentile of |H - E| / E
+Peers, where their packages are installed in the Python of --peers (pip install '.[bench]' in an environment of its
+own: bpy pins an older numpy): Mitsuba 3 at the points alone, and a light map of Blender's Cycles, denoised.  Their
+start is left out: CPU seconds begin after their packages are imported, and hold reading, building and tracing.
+
+Writes speed.json, speed.md and speed.svg into benchmarks/results, after every bake, so that a run that is cut short
+is not lost.
 """
 
 import argparse
-import shutil
+import json
+import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path[:0] = [str(ROOT), str(ROOT / "benchmarks")]
-
+import bake  # noqa: E402
+import measure  # noqa: E402
+import numpy as np  # noqa: E402
 import reference  # noqa: E402
+import score  # noqa: E402
+import speed_report  # noqa: E402
 
-from lib.formats import artefact, casters, light_maps, scene  # noqa: E402
-from lib.maps.fill import one_deep  # noqa: E402
-
-COLUMNS = "| scene | tolerance | surfaces | samples | rays, M | CPU s | RMSE, % | 95 %, % | bias, % |"
-
-
-def bake(name, tolerance, cores):
-    """Bake a reference scene anew up to its maps; the folder of its stages."""
-    called = f"reference_{name}_{tolerance:g}".replace(".", "_")
-    folder, results = ROOT / "results" / "benchmarks" / called, ROOT / "results" / called
-    for old in (folder, results):
-        shutil.rmtree(old, ignore_errors=True)
-    reference.write_scene(name, folder, {"tolerance": tolerance})
-    snakemake = [sys.executable, "-m", "snakemake", "--cores", str(cores), "--quiet", "all"]
-    subprocess.run([*snakemake, "--until", "balance_resample", "--config", f"scene={folder}"], cwd=ROOT, check=True)
-    return results / "stages"
-
-
-def irradiance(stages, names, uv):
-    """H of the baked maps at (k, 2) parameters of named surfaces, (k, 3): bilinear, hidden samples filled one deep."""
-    x, shapes = scene.load(stages / "import_scene" / "scene.npz"), casters.load(stages / "tessellate" / "casters.npz")
-    maps = light_maps.merge(light_maps.load(path) for path in sorted(stages.glob("balance_resample/chunk_*.npz"))).maps
-    H = np.full((len(uv), 3), np.nan)
-    for k, surface in enumerate(maps.surface):
-        mine = np.flatnonzero(names == x.names[surface])
-        texels = one_deep(maps.map(k).sum(axis=2), maps.hidden_map(k), shapes.is_closed[surface])
-        s, t = uv[mine, 0] * (texels.shape[1] - 1), uv[mine, 1] * (texels.shape[0] - 1)
-        i, j = np.minimum(s.astype(int), texels.shape[1] - 2), np.minimum(t.astype(int), texels.shape[0] - 2)
-        a, b = (s - i)[:, None], (t - j)[:, None]
-        low = texels[j, i] * (1 - a) + texels[j, i + 1] * a
-        high = texels[j + 1, i] * (1 - a) + texels[j + 1, i + 1] * a
-        H[mine] = low * (1 - b) + high * b
-    return H, maps
+ROOT = HERE.parent
+SCENES = ("cornell", "room")
+TOLERANCES = (0.04, 0.02, 0.014, 0.01, 0.007, 0.004, 0.002)
+CYCLES = {name: ((100_000, 16), (200_000, 32), (300_000, 96)) for name in SCENES}  # texels, paths a texel
+OTHER_GRIDS = (
+    1.0,
+    1.06,
+    0.94,
+    1.03,
+    0.97,
+)  # a light map's error hangs on where its texels lie beside the contacts: every repeat lays them anew
+MITSUBA = (64, 256, 1024)
+QUICK = {"tolerances": (0.04, 0.02), "cycles": {name: ((5_000, 16),) for name in SCENES}, "mitsuba": (16,)}
+SILENT = {"PYTHONWARNINGS": "ignore", "OMP_NUM_THREADS": "2"}
 
 
-def row(name, tolerance, cores):
-    """One line of the table."""
-    stages = bake(name, tolerance, cores)
-    names, uv, E, se = reference.points_on_pieces(name)
-    H, maps = irradiance(stages, names, uv)
-    seen = np.isfinite(H).all(axis=1)
-    wrong, E, se = (H - E)[seen], E[seen], se[seen]
-    rmse = np.sqrt(max((wrong**2 - se**2).mean(), 0)) / E.mean()
-    p95 = np.percentile(np.abs(wrong) / np.maximum(E, 1e-9 * E.mean()), 95)
-    costs = [artefact.read_json(path) for path in stages.glob("*/cost*.json")]
-    seconds, rays = sum(cost["cpu_seconds"] for cost in costs), sum(cost["rays"] for cost in costs)
-    figures = [f"{rays / 1e6:.1f}", f"{seconds:.1f}", *(f"{100 * x:.2f}" for x in (rmse, p95, wrong.mean() / E.mean()))]
-    left_out = f" ({(~seen).sum()} points on surfaces without a map)" if not seen.all() else ""
-    sizes = [str(len(maps.surface)), str(len(maps.value))]
-    return "| " + " | ".join([name, f"{tolerance:g}", *sizes, *figures]) + " |" + left_out
+def ours(scene, tolerance, seed, args):
+    """One bake: its row."""
+    folder = args.work / "scenes" / scene
+    reference.write_scene(scene, folder, {"tolerance": tolerance, "seed": seed})
+    results, figures = bake.bake(folder, args.work / "bake", args.cores)
+    names, uv, E, se = reference.points_on_pieces(scene)
+    return {
+        "setting": f"tolerance {tolerance:g}",
+        "tolerance": tolerance,
+        **score.errors(bake.irradiance(results, names, uv), E, se),
+        **figures,
+    }
+
+
+def peer(script, scene, options, seed, args):
+    """One run of a peer's script: its row."""
+    out = args.work / "peer.npz"
+    log = args.work / "peer.txt"
+    command = [
+        args.peers,
+        HERE / "peers" / script,
+        HERE / "reference" / scene,
+        out,
+        "--seed",
+        seed,
+        "--threads",
+        args.cores,
+    ]
+    spent = measure.run([*command, *options], env={**os.environ, **SILENT}, log=log)
+    said = json.loads(next(line for line in reversed(log.read_text().splitlines()) if line.startswith("{")))
+    _, _, E, se = reference.points_on_pieces(scene)
+    errors = score.errors(np.load(out)["E"].astype(float), E, se)
+    return {**errors, **said, "cpu": spent.cpu - said["cpu_import"], "wall": spent.wall, "peak_mb": spent.peak_mb}
+
+
+def cycles(scene, texels, paths, seed, args):
+    """One light map: its row."""
+    options = ["--texels", int(texels * OTHER_GRIDS[seed % len(OTHER_GRIDS)]), "--samples", paths]
+    return peer("blender.py", scene, options, seed, args)
+
+
+def can(python, package):
+    """The interpreter has the package and it starts; "" or what it said."""
+    done = subprocess.run([python, "-c", f"import {package}"], capture_output=True, text=True)
+    return "" if done.returncode == 0 else (done.stderr.strip().splitlines() or ["it does not start"])[-1]
+
+
+def mitsuba_variant(python):
+    """The fastest variant that works here."""
+    test = "import mitsuba as mi; mi.set_variant('llvm_ad_rgb'); print(mi.Float(1) + 1)"
+    return "llvm_ad_rgb" if subprocess.run([python, "-c", test], capture_output=True).returncode == 0 else "scalar_rgb"
+
+
+def plan(args):
+    """What one repeat consists of: [(who, scene, setting text, function of the seed)]."""
+    jobs = []
+    for scene in args.scenes:
+        if "ours" in args.who:
+            jobs += [
+                ("ours", scene, f"tolerance {t:g}", lambda seed, s=scene, t=t: ours(s, t, seed, args))
+                for t in args.tolerances
+            ]
+        if "mitsuba" in args.who:
+            for n in args.mitsuba:
+                options = ["--samples", n, "--variant", args.variant]
+                jobs.append(
+                    (
+                        "mitsuba",
+                        scene,
+                        f"{n} paths a point",
+                        lambda seed, s=scene, o=options: peer("mitsuba_points.py", s, o, seed, args),
+                    )
+                )
+        if "cycles" in args.who:
+            for texels, n in args.cycles[scene]:
+                text = f"{texels // 1000} k texels, {n} paths"
+                jobs.append(("cycles", scene, text, lambda seed, s=scene, t=texels, n=n: cycles(s, t, n, seed, args)))
+    return jobs
+
+
+def machine():
+    """What it ran on."""
+    try:
+        models = {
+            line.split(":")[1].strip()
+            for line in open("/proc/cpuinfo", encoding="utf-8")
+            if line.startswith("model name")
+        }
+    except OSError:
+        models = {platform.processor()}
+    commit = subprocess.run(
+        ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True
+    ).stdout.strip()
+    return {
+        "processor": ", ".join(sorted(models)),
+        "cores": os.cpu_count(),
+        "python": platform.python_version(),
+        "commit": commit,
+    }
+
+
+def parsed(argv):
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--scenes", nargs="+", default=SCENES, choices=SCENES)
+    parser.add_argument("--tolerances", nargs="+", type=float, default=TOLERANCES)
+    parser.add_argument(
+        "--repeat", type=int, default=1, help="runs of everything; the table is medians (3 for figures to quote)"
+    )
+    parser.add_argument("--cores", type=int, default=min(2, os.cpu_count() or 1))
+    parser.add_argument(
+        "--peers",
+        default=os.environ.get("BENCH_PYTHON", sys.executable),
+        metavar="PYTHON",
+        help="interpreter that has mitsuba or bpy (default: $BENCH_PYTHON, else this one)",
+    )
+    parser.add_argument(
+        "--who", nargs="+", default=["ours", "mitsuba", "cycles"], choices=["ours", "mitsuba", "cycles"]
+    )
+    parser.add_argument("--quick", action="store_true", help="two coarse bakes a scene, small peers: does it all work?")
+    parser.add_argument("--add", action="store_true", help="keep the rows that speed.json has and add to them")
+    parser.add_argument("--out", type=Path, help="default: benchmarks/results; results/benchmarks/quick with --quick")
+    args = parser.parse_args(argv)
+    args.work = ROOT / "results" / "benchmarks"
+    args.out = args.out or (args.work / "quick" if args.quick else HERE / "results")
+    args.cycles, args.mitsuba = CYCLES, MITSUBA
+    if args.quick:
+        args.tolerances, args.cycles, args.mitsuba = QUICK["tolerances"], QUICK["cycles"], QUICK["mitsuba"]
+    return args
 
 
 def main(argv=None):
-    """Print the table, a line as soon as it is measured."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--scenes", nargs="+", default=["cornell", "room"], choices=["cornell", "room"])
-    parser.add_argument("--tolerances", nargs="+", type=float, default=[0.05, 0.02, 0.01])
-    parser.add_argument("--cores", type=int, default=2)
-    args = parser.parse_args(argv)
-    print(COLUMNS, "|---" * 9 + "|", sep="\n", flush=True)
-    for name in args.scenes:
-        for tolerance in args.tolerances:
-            print(row(name, tolerance, args.cores), flush=True)
+    """Measure everything, telling each row as it comes."""
+    args = parsed(argv)
+    for folder in (args.work, args.out):
+        folder.mkdir(parents=True, exist_ok=True)
+    for who, package in (("mitsuba", "mitsuba"), ("cycles", "bpy")):
+        if who in args.who and (why := can(args.peers, package)):
+            print(f"{who} is left out: {args.peers}: {why}", flush=True)
+            args.who = [w for w in args.who if w != who]
+    if "mitsuba" in args.who:
+        args.variant = mitsuba_variant(args.peers)
+    table = args.out / "speed.json"
+    rows = json.loads(table.read_text())["rows"] if args.add and table.exists() else []
+    jobs = plan(args)
+    for seed in range(1, args.repeat + 1):
+        for who, scene, setting, job in jobs:
+            row = {"who": who, "scene": scene, "setting": setting, "seed": seed, **job(seed)}
+            rows.append(row)
+            figures = f"{row['cpu']:8.1f} CPU s {100 * row['rmse']:7.2f} % RMSE {100 * row['p95']:7.2f} % at 95"
+            print(f"{who:8} {scene:8} {setting:24} {figures} {100 * row['bias']:+6.2f} % bias", flush=True)
+            bake.artefact.write_json(table, {"machine": machine(), "rows": rows})
+            speed_report.write(args.out, machine(), rows)
+    print(f"{args.out}/speed.md, speed.svg, speed.json")
     return 0
 
 

@@ -1,0 +1,108 @@
+"""One whole bake through the real pipeline and what it cost: Snakemake and all its jobs, from nothing to the end."""
+
+import functools
+import os
+import shutil
+import sys
+from pathlib import Path
+
+import measure
+import numpy as np
+import score
+
+ROOT = Path(__file__).resolve().parents[1]
+if str(ROOT) not in sys.path:
+    sys.path.insert(0, str(ROOT))
+
+from lib.formats import artefact, pictures  # noqa: E402
+from lib.formats.names import cleaned  # noqa: E402
+
+APART = ("package", "report")  # counted beside the pipeline: they make the files people open, not the light
+
+
+def bake(folder, work, cores=2, settings=None):
+    """Bake the scene `folder` from nothing, in the working folder `work`: (its results folder, dict of figures).
+
+    cpu : all processes, less the jobs of APART; apart : those; startup : what the interpreter and the imports of all
+    other jobs take; scheduling : Snakemake and the shells, all that no job accounts for; stages : CPU seconds and
+    rays by stage.
+    """
+    shutil.rmtree(work, ignore_errors=True)
+    Path(work).mkdir(parents=True)
+    given = [f"{key}={value}" for key, value in (settings or {}).items()]
+    command = [
+        sys.executable,
+        "-m",
+        "snakemake",
+        "--snakefile",
+        ROOT / "Snakefile",
+        "--directory",
+        work,
+        "--cores",
+        cores,
+    ]
+    spent = measure.run([*command, "--quiet", "all", "--config", f"scene={folder}", *given], log=Path(work) / "log.txt")
+    results = Path(work) / "results" / cleaned(Path(folder).name)
+    stages, seconds, jobs, rays, peak = {}, 0.0, 0, 0, 0.0
+    startup = 0.0
+    for path in sorted((results / "stages").glob("*/cost*.json")):
+        cost = artefact.read_json(path)
+        half = next((h for h in ("indirect", "direct") if h in path.stem), "")
+        name = f"{cost['stage']} {half}".strip()
+        row = stages.setdefault(name, {"jobs": 0, "cpu": 0.0, "rays": 0})
+        row["jobs"] += 1
+        row["cpu"] += cost["cpu_seconds"]
+        row["rays"] += cost["rays"]
+        seconds += cost["cpu_seconds"]
+        rays += cost["rays"]
+        jobs += 1
+        peak = max(peak, cost["peak_mb"])
+        if name not in APART:
+            startup += start_up(cost["stage"])
+    apart = sum(stages[name]["cpu"] for name in APART if name in stages)
+    figures = {
+        "cpu": spent.cpu - apart,
+        "apart": apart,
+        "wall": spent.wall,
+        "scheduling": spent.cpu - seconds,
+        "startup": startup,
+        "peak_mb": spent.peak_mb,
+        "largest_job_mb": peak,
+        "rays": rays,
+        "jobs": jobs,
+        "texels": texels(results),
+        "stages": stages,
+    }
+    return results, figures
+
+
+@functools.cache
+def start_up(stage):
+    """CPU seconds of a process that imports a stage and does nothing."""
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    return measure.least_of([sys.executable, "-c", f"import stages.{stage}"], cwd=ROOT, env=environment)
+
+
+def maps(results):
+    """{surface name: (B (h, w, 3), rho_avg (3,))} of a bake's illumination maps, as anybody would read them."""
+    out = {}
+    for path in sorted((Path(results) / "maps").glob("*.exr")):
+        B, metadata = pictures.read_exr(path)
+        out[metadata["surface"]] = B, np.array(metadata["rho_avg"])
+    return out
+
+
+def texels(results):
+    """Texels of all maps."""
+    return sum(B.shape[0] * B.shape[1] for B, _ in maps(results).values())
+
+
+def irradiance(results, names, uv):
+    """H at uv (k, 2) of the named surfaces, (k, 3): B of maps/*.exr over rho_avg, bilinear; NaN where rho_avg is 0."""
+    H = np.full((len(uv), 3), np.nan)
+    for name, (B, rho) in maps(results).items():
+        mine = np.flatnonzero(names == name)
+        if mine.size and (rho > 0).all():
+            size = np.array([B.shape[1] - 1, B.shape[0] - 1])
+            H[mine] = score.bilinear(B, *(uv[mine] * size).T) / rho
+    return H

@@ -1,0 +1,184 @@
+"""speed.md and speed.svg from the rows of benchmarks/run.py: medians, ratios at equal error, figures asked for."""
+
+from statistics import median
+
+import charts
+import score
+
+NAMES = {"ours": "this baker", "mitsuba": "Mitsuba 3, points alone", "cycles": "Cycles + OIDN light map"}
+# Least ratio of the peer's CPU seconds to ours at the error of its row nearest to the one named.
+RATIOS = [("room", 0.0115, 10), ("room", 0.0077, 20), ("cornell", 0.013, 5), ("cornell", 0.0094, 18)]
+# Quality: (name, RMSE, p95, {scene: CPU seconds}).
+LEVELS = [
+    ("preview", 0.02, 0.05, {"cornell": 4, "room": 6}),
+    ("standard", 0.01, 0.03, {"cornell": 5, "room": 8}),
+    ("final", 0.005, 0.015, {"cornell": 15, "room": 30}),
+]
+FIGURES = ("cpu", "apart", "wall", "scheduling", "startup", "peak_mb", "rays", "texels", "rmse", "p95", "bias")
+
+
+def medians(rows):
+    """One row for each who, scene and setting: the medians of its runs; in the order of their first appearance."""
+    groups = {}
+    for row in rows:
+        groups.setdefault((row["who"], row["scene"], row["setting"]), []).append(row)
+    out = []
+    for (who, scene, setting), runs in groups.items():
+        found = {f: median(r[f] for r in runs) for f in FIGURES if all(f in r for r in runs)}
+        out.append({"who": who, "scene": scene, "setting": setting, "runs": len(runs), **found})
+    return out
+
+
+def curve(rows, who, scene, figure="rmse"):
+    """[(CPU seconds, error), ...] of one renderer in one scene."""
+    return [(r["cpu"], r[figure]) for r in rows if r["who"] == who and r["scene"] == scene]
+
+
+def write(folder, machine, rows):
+    """Write speed.md and speed.svg into a folder."""
+    rows = medians(rows)
+    scenes = list(dict.fromkeys(r["scene"] for r in rows))
+    (folder / "speed.md").write_text(markdown(machine, rows, scenes), encoding="utf-8")
+    lines = [
+        (f"{NAMES[who]}, {scene}", sorted(curve(rows, who, scene)))
+        for scene in scenes
+        for who in NAMES
+        if curve(rows, who, scene)
+    ]
+    percent = [(name, [(cpu, 100 * error) for cpu, error in line if error > 0]) for name, line in lines]
+    picture = charts.loglog(
+        "Error of irradiance against CPU time", "CPU seconds, all processes", "relative RMSE, %", percent
+    )
+    (folder / "speed.svg").write_text(picture, encoding="utf-8")
+
+
+def markdown(machine, rows, scenes):
+    """The tables."""
+    runs = max(r["runs"] for r in rows)
+    text = [
+        "# Error against CPU seconds",
+        "",
+        f"Made by `make bench`; {machine['cores']} cores of {machine['processor']},"
+        f" Python {machine['python']}, commit {machine['commit']};"
+        f" medians of {runs} run{'s' if runs > 1 else ''} with other seeds."
+        " CPU seconds are user + system of all processes;"
+        " errors are relative to the mean irradiance of the reference points.",
+        "",
+        "## This baker, whole pipeline",
+        "",
+        "CPU: from nothing to maps, textures and levels of detail, Snakemake included,"
+        " `package` and `report` apart. Of it, scheduling: Snakemake and"
+        " shells; start: interpreters and imports of the jobs.",
+        "",
+        "| scene | setting | RMSE, % | 95 %, % | bias, % | CPU s | scheduling | start | apart | wall s"
+        " | rays, M | texels, k | memory, MB |",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+    ]
+    for r in (r for r in rows if r["who"] == "ours"):
+        cells = [
+            r["scene"],
+            r["setting"],
+            *_errors(r),
+            f"{r['cpu']:.1f}",
+            f"{r['scheduling']:.1f}",
+            f"{r['startup']:.1f}",
+        ]
+        cells += [
+            f"{r['apart']:.1f}",
+            f"{r['wall']:.1f}",
+            f"{r['rays'] / 1e6:.1f}",
+            f"{r['texels'] / 1e3:.0f}",
+            f"{r['peak_mb']:.0f}",
+        ]
+        text.append(_line(cells))
+    if any(r["who"] != "ours" for r in rows):
+        text += ["", "## Peers", "", "Without their start: seconds begin when their packages are imported.", ""]
+        text += [
+            "| renderer | scene | setting | RMSE, % | 95 %, % | bias, % | CPU s | ours at this RMSE, CPU s | ratio |",
+            "|---|---|---|---|---|---|---|---|---|",
+        ]
+        for r in (r for r in rows if r["who"] != "ours"):
+            text.append(
+                _line([NAMES[r["who"]], r["scene"], r["setting"], *_errors(r), f"{r['cpu']:.1f}", *_against(rows, r)])
+            )
+    text += ["", "## Asked for", "", *_levels(rows, scenes), *_ratios(rows, scenes)]
+    return "\n".join(text) + "\n"
+
+
+def _line(cells):
+    return "| " + " | ".join(cells) + " |"
+
+
+def _errors(r):
+    return [f"{100 * r['rmse']:.2f}", f"{100 * r['p95']:.2f}", f"{100 * r['bias']:+.2f}"]
+
+
+def _against(rows, r):
+    """Our CPU seconds at the error of a peer's row, and the ratio of its seconds to them."""
+    mine = curve(rows, "ours", r["scene"])
+    cpu = score.cpu_at(mine, r["rmse"]) if mine else None
+    if cpu is None and mine and r["rmse"] > max(error for _, error in mine):
+        least = min(cpu for cpu, _ in mine)
+        return [f"< {least:.1f}", f"> {r['cpu'] / least:.1f}"]
+    return ["", ""] if cpu is None else [f"{cpu:.1f}", f"{r['cpu'] / cpu:.1f}"]
+
+
+def _levels(rows, scenes):
+    """CPU seconds at which both errors of a quality are met, against those asked for."""
+    out = [
+        "| quality | scene | RMSE, % | 95 %, % | CPU s by RMSE | CPU s by 95 % | asked | |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for name, rmse, p95, asked in LEVELS:
+        for scene in (s for s in scenes if curve(rows, "ours", s)):
+            found = [
+                _reached(curve(rows, "ours", scene, figure), limit) for figure, limit in (("rmse", rmse), ("p95", p95))
+            ]
+            met = all(f is not None for f in found) and max(found) <= asked[scene]
+            cells = [
+                name,
+                scene,
+                f"{100 * rmse:g}",
+                f"{100 * p95:g}",
+                *("not reached" if f is None else f"{f:.1f}" for f in found),
+            ]
+            out.append(_line([*cells, str(asked[scene]), "met" if met else "missed"]))
+    return [*out, ""]
+
+
+def _reached(line, limit):
+    """CPU seconds at which an error is met: interpolated, or the cheapest row if that is already better."""
+    enough = [cpu for cpu, error in line if error <= limit]
+    if not enough:
+        return None
+    return score.cpu_at(line, limit) or min(enough)
+
+
+def _ratios(rows, scenes):
+    """Ratios to Cycles + OIDN near the errors named."""
+    out = [
+        "| scene | near RMSE, % | Cycles: RMSE, % | CPU s | ours, CPU s | ratio | asked | |",
+        "|---|---|---|---|---|---|---|---|",
+    ]
+    for scene, near, asked in RATIOS:
+        theirs = [r for r in rows if r["who"] == "cycles" and r["scene"] == scene]
+        if scene not in scenes or not theirs or not curve(rows, "ours", scene):
+            continue
+        r = min(theirs, key=lambda r: abs(r["rmse"] - near))
+        cpu, ratio = _against(rows, r)
+        met = bool(ratio) and float(ratio.strip("> ")) >= asked
+        out.append(
+            _line(
+                [
+                    scene,
+                    f"{100 * near:g}",
+                    f"{100 * r['rmse']:.2f}",
+                    f"{r['cpu']:.1f}",
+                    cpu,
+                    ratio,
+                    str(asked),
+                    "met" if met else "missed",
+                ]
+            )
+        )
+    return out if len(out) > 2 else []
