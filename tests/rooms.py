@@ -28,7 +28,7 @@ BAKE = {
 
 
 def scene_of(surfaces):
-    """A Scene of {name: (surface, facts)}; facts may hold E, role, flip, group, is_black, tolerance."""
+    """A Scene of {name: (surface, facts)}; facts may hold E, role, flip, group, is_black."""
     names = sorted(surfaces)
     facts = [surfaces[name][1] for name in names]
     n = len(names)
@@ -42,8 +42,6 @@ def scene_of(surfaces):
         group=np.array([f.get("group", 0) for f in facts], dtype=np.int32),
         groups=[f"lamps {g}" for g in range(1 + max(f.get("group", 0) for f in facts))],
         is_black=np.array([f.get("is_black", False) for f in facts]),
-        reconstruction=["texture"] * n,
-        tolerance=np.array([f.get("tolerance", np.nan) for f in facts], dtype=np.float64),
         material=["white"] * n,
         up="z",
         warnings=[],
@@ -77,7 +75,7 @@ def slices(**changes):
         "up": "z",
     }
     made = {stage: json.loads(text) for stage, text in rule_settings(settings).items()}
-    for stage in ("sample", "shoot", "refine", "balance_resample"):
+    for stage in ("sample", "shoot", "refine", "balance_resample"):  # tolerances: {surface name: its own}
         made[stage] |= {key: value for key, value in changes.items() if key in made[stage] and key not in BAKE}
     return made
 

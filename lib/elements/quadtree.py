@@ -129,10 +129,15 @@ class Quadtree:
         least = np.minimum.reduce([reach[:-1, :-1], reach[:-1, 1:], reach[1:, :-1], reach[1:, 1:]])
         return self.side * 2.0**-level > WIDE * least
 
+    def _light(self, step):
+        """Light that decides, at every step-th crossing: the sum over light groups (h, w, 3)."""
+        value = self.value[::step, ::step]
+        return value if value.shape[2] <= 3 else value.reshape(*value.shape[:2], -1, 3).sum(axis=2)
+
     def contrast(self, level):
         """Largest difference between visible corners of each cell of a level, over channels: (rows, columns)."""
         step = 2 ** (self.level - level)
-        value, hidden = self.value[::step, ::step], self.hidden[::step, ::step]
+        value, hidden = self._light(step), self.hidden[::step, ::step]
         low = np.where(hidden[..., None], np.inf, value)
         high = np.where(hidden[..., None], -np.inf, value)
         corners = [(slice(None, -1), slice(None, -1)), (slice(None, -1), slice(1, None))]
@@ -145,7 +150,7 @@ class Quadtree:
         columns).
         """
         step = 2 ** (self.level - level - 1)
-        value, hidden = self.value[::step, ::step], self.hidden[::step, ::step]
+        value, hidden = self._light(step), self.hidden[::step, ::step]
         row = _departure(value[::2, ::2], hidden[::2, ::2], value[::2, 1::2], hidden[::2, 1::2], axis=1)
         column = _departure(value[::2, ::2], hidden[::2, ::2], value[1::2, ::2], hidden[1::2, ::2], axis=0)
         ends, ends_hidden = value[::2, ::2], hidden[::2, ::2]

@@ -147,7 +147,8 @@ def indirect_light(x, N, shift, K, tracer, mesh, table, channels):
         random = ((onward[None] + shift[part, None, ::-1]) % 1.0).reshape(-1, 2)
         seen = _follow(origins, D, hits, random, tracer, mesh, table, MOST_STEPS).reshape(k, K, channels)
         H[part] = seen.mean(axis=1)
-        noise[part] = NOISE * seen.std(axis=1).max(axis=1) / K**0.8
+        all_groups = seen if channels <= 3 else seen.reshape(k, K, -1, 3).sum(axis=2)
+        noise[part] = NOISE * all_groups.std(axis=1).max(axis=1) / K**0.8
         back = hits.is_back.reshape(k, K)
         hidden[part] = is_hidden(back, mesh.is_shell(hits.face).reshape(k, K)) if back.any() else False
         reach[part] = K / (1 / np.maximum(hits.t, 1e-6)).reshape(k, K).sum(axis=1)

@@ -121,9 +121,8 @@ def contrast_at(points, solution):
     n_u, n_v = solution.n_u[s], solution.n_v[s]
     if not len(solution.spread):
         return np.full(len(s), USUAL_CONTRAST)
-    H = np.sqrt(
-        np.maximum(solution.H_element, 1e-12 * solution.H_element.max()) * max(solution.H_element.mean(), 1e-300)
-    )
+    own = solution.H_element.astype(np.float64)
+    H = np.sqrt(np.maximum(own, 1e-12 * own.max()) * own.mean())
     contrast = solution.spread / np.maximum(H, 1e-300)
     i = np.minimum((points.uv[:, 0] * n_u).astype(np.int64), n_u - 1)
     j = np.minimum((points.uv[:, 1] * n_v).astype(np.int64), n_v - 1)

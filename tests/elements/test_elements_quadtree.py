@@ -139,6 +139,17 @@ def test_the_largest_channel_decides():
     assert grown(coloured, tau=0.1, top=4, channels=3).level == 4
 
 
+def test_the_sum_over_light_groups_decides():
+    """Two lamps whose steps cancel: nothing to follow, whatever they are called."""
+
+    def two_lamps(u, v):
+        one = np.stack([step(u, v)] * 3, axis=1)
+        return np.concatenate([one, 1 - one], axis=1)
+
+    assert grown(two_lamps, tau=0.1, top=4, channels=6).level == 1
+    assert grown(lambda u, v: two_lamps(u, v)[:, [0, 0, 0, 1, 1, 1]], tau=0.1, top=4, channels=6).level == 4
+
+
 def test_round_a_seam():
     """A bump on the seam: first and last column stay one sample, both sides are divided alike."""
     lattice = Lattice((2, 1), closed=(True, False))
