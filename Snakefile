@@ -41,7 +41,7 @@ envvars:  # goes with jobs to other machines
 PYTHON = sys.executable
 OUT = f"results/{scene.name}"
 STAGE = f"{OUT}/stages"
-SETTINGS = rule_settings(scene.settings, scene.warnings)
+SETTINGS = rule_settings(scene.settings, scene.warnings, scene.tolerances, scene.reconstruction)
 MAPPED = [f for f, role, black in zip(scene.files, scene.roles, scene.is_black) if role != "cast_only" and not black]
 N_CHUNKS = n_chunks(scene.settings, len(MAPPED))
 CHUNKS = range(N_CHUNKS)
@@ -256,6 +256,8 @@ rule lod_export:
     input:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
+        # Light in vertices needs vertices on the lattice of the final map.
+        textures=rules.budget_reduce.output.textures if "gouraud" in scene.reconstruction.values() else [],
     output:
         f"{STAGE}/lod_export/lod_{{k}}.npz",
     log:
@@ -264,9 +266,11 @@ rule lod_export:
     params:
         *code("lod_export"),
         levels=SETTINGS["lod_export"],
+        more=["--textures", f"{STAGE}/budget_reduce/textures.npz"] if "gouraud" in scene.reconstruction.values() else [],
+        reconstruction=SETTINGS["reconstruction"],
     shell:
         "{PYTHON:q} -m stages.lod_export --scene {input.scene:q} --casters {input.casters:q} --levels {params.levels:q} --units m"
-        " --level-index {wildcards.k} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
+        " --level-index {wildcards.k} {params.more:q} --reconstruction {params.reconstruction:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
 
 rule package:

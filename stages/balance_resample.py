@@ -4,7 +4,7 @@ idle levels dropped.
 reads   scene.npz, solution.npz, direct_<c>.npz, indirect_<c>.npz                  (lib.formats.scene, .solution,
 .trees) writes  chunk_<c>.npz: irradiance H per light group                                (lib.formats.light_maps)
 
-settings: tolerance, relative_to, t_direct, t_indirect
+settings: tolerance, tolerances, relative_to, t_direct, t_indirect
 """
 
 import json
@@ -15,7 +15,7 @@ from lib import door
 from lib.formats import light_maps, scene, solution, trees
 from lib.maps.combine import combine
 from lib.maps.mapset import MapSet
-from lib.radiosity.thresholds import thresholds
+from lib.radiosity.thresholds import own_share, thresholds
 
 IDLE = 0.25  # levels within this share of the threshold of their prediction say nothing
 
@@ -31,7 +31,7 @@ def body(args, cost):
     """Load, resample, save."""
     x, solved = scene.load(args.scene), solution.load(args.solution)
     direct, indirect = trees.load(args.direct, "direct")[0], trees.load(args.indirect, "indirect")[0]
-    tau = thresholds(solved, x.tolerance, "direct", args.settings)
+    tau = thresholds(solved, own_share(x.names, args.settings), "direct", args.settings)
     maps, stats = {}, {}
     for s, tree in sorted(direct.items()):
         other = indirect.get(s)

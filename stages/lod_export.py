@@ -31,6 +31,7 @@ def arguments(parser):
     parser.add_argument("--levels", required=True, type=json.loads, metavar="JSON", help="all levels, finest first")
     parser.add_argument("--level-index", required=True, type=int, metavar="K", help="which of them to cut, from 0")
     parser.add_argument("--units", default="m", choices=sorted(METRES), help="of lengths without a unit (default m)")
+    parser.add_argument("--reconstruction", type=json.loads, default={}, metavar="JSON", help="{surface: way}")
     parser.add_argument("--out", required=True, metavar="FILE", help="lod_<k>.npz")
 
 
@@ -42,7 +43,7 @@ def body(args, cost):
     surfaces = tessellate.into_frame(x.surfaces, shapes.centre, shapes.scale)
     k, asked = args.level_index, levels[args.level_index]
     try:
-        level = cut(Scene(surfaces, shapes, lattice(x, args.textures)), levels, k, args.units, shapes.scale)
+        level = cut(Scene(surfaces, shapes, lattice(x.names, args.textures, args.reconstruction)), levels, k, args.units, shapes.scale)
     except TooFine as error:
         raise refusal(f"{json.dumps(asked)} {error}", field=f"lods[{k}]") from None
     note = ""
@@ -57,15 +58,16 @@ def body(args, cost):
     cost.notes.update(level=k, triangles=len(level.mesh.F), distance=float(level.mesh.distance.max()) * shapes.scale)
 
 
-def lattice(x, textures):
+def lattice(names, textures, reconstruction):
     """{surface: (u, v)} the inner lattice lines of the maps whose light goes into vertices."""
-    if textures is None or "gouraud" not in x.reconstruction and "auto" not in x.reconstruction:
+    if textures is None:
         return {}
     maps = textured_maps.load(textures)
     out = {}
     for k, s in enumerate(maps.final.surface.tolist()):
+        asked = reconstruction.get(names[s], "auto")
         is_smallest = maps.final.level[k] == 0 and not maps.textured[k]
-        if x.reconstruction[s] == "gouraud" or (x.reconstruction[s] == "auto" and is_smallest):
+        if asked == "gouraud" or (asked == "auto" and is_smallest):
             h, w = maps.final.hidden_map(k).shape
             out[s] = (np.arange(1, w - 1) / (w - 1), np.arange(1, h - 1) / (h - 1))
     return out

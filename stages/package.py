@@ -2,7 +2,7 @@
 
 reads   scene.npz, casters.npz, textures.npz, lod_<k>.npz of every level, finest first, reflectances
                                                   (lib.formats.scene, .casters, .textured_maps, .lod_mesh)
-        settings: {"exposure": "auto" or a number > 0}
+        settings: {"exposure": "auto" or a number > 0, "reconstruction": {surface: "texture" | "gouraud"}}
 writes  RESULTS/textures/<surface>.png, scene_LOD<k>.gltf and .bin, scene.glb, lods.json
 
 Profile `standard`: KHR_materials_unlit, base colour texture = (B_final + E) / pi times exposure, sRGB, one a surface.
@@ -42,7 +42,8 @@ def body(args, cost):
 
     exposure = chosen_exposure(args.settings.get("exposure", "auto"), maps.final, shapes.area[mapped])
     extras = {"unit": "B_over_pi", "encoding": "srgb", "exposure": exposure}
-    looks = export.looks(x, shapes, maps, read_json(args.materials)["rho_avg"], exposure, levels, results)
+    rho_avg, ways = read_json(args.materials)["rho_avg"], args.settings.get("reconstruction", {})
+    looks = export.looks(x, shapes, maps, rho_avg, exposure, ways, levels, results)
     materials = [look.material for look in looks]
 
     origin = export.origin(shapes, x.up)

@@ -4,7 +4,7 @@ all direct trees.
 reads   scene.npz, casters.npz, solution.npz, and chunk_<c>.npz of sample (direct) or all direct_<c>.npz (indirect)
 writes  direct_<c>.npz or indirect_<c>.npz          (lib.formats.trees)
 
-settings: seed, tolerance, relative_to, t_direct, t_indirect, base_indirect, top, gather_rays, shadow_rays, bounces
+settings: seed, tolerance, tolerances, relative_to, t_direct, t_indirect, base_indirect, top, gather_rays, shadow_rays, bounces
 """
 
 import json
@@ -13,8 +13,9 @@ import numpy as np
 
 from lib import door
 from lib.formats import casters, samples, scene, solution, trees
+from lib.radiosity.quality import gather_rays
 from lib.radiosity.refine import error_of, lookup_table, refine_direct, refine_indirect
-from lib.radiosity.thresholds import thresholds
+from lib.radiosity.thresholds import own_share, thresholds
 from lib.radiosity.world import World
 
 
@@ -34,7 +35,8 @@ def body(args, cost):
     """Load, refine, save."""
     world = World(scene.load(args.scene), casters.load(args.casters))
     solved, chosen = solution.load(args.solution), args.settings
-    tau = thresholds(solved, world.scene.tolerance, args.half, chosen)
+    own = own_share(world.scene.names, chosen)
+    tau = thresholds(solved, own, args.half, chosen)
     if args.half == "direct":
         x = samples.load(args.samples)
         done, spared = refine_direct(
@@ -48,17 +50,9 @@ def body(args, cost):
         mine = world.chunk(args.chunks, args.chunk)
         follows = chosen["bounces"] == "converge"
         table = lookup_table(world, direct, solved, follows)
-        done = refine_indirect(
-            world,
-            mine,
-            table,
-            solved,
-            chosen["seed"],
-            tau,
-            chosen["top"],
-            chosen["base_indirect"],
-            chosen["gather_rays"],
-        )
+        rays = gather_rays(chosen["gather_rays"], own)
+        top, base = chosen["top"], chosen["base_indirect"]
+        done = refine_indirect(world, mine, table, solved, chosen["seed"], tau, top, base, rays)
     trees.save(args.out, args.half, {int(s): stored(t, world.n_groups) for s, t in done.items()}, cost.notes)
     cost.rays = world.tracer.rays
 

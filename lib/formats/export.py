@@ -27,10 +27,11 @@ class Look:
     in_vertices: Callable | None = None
 
 
-def looks(x, shapes, maps, rho_avg, exposure, levels, results):
+def looks(x, shapes, maps, rho_avg, exposure, reconstruction, levels, results):
     """A Look for every surface of the scene x; writes the textures.
 
     shapes : Casters;  maps : TexturedMaps;  rho_avg : {name: (3,)};  levels : LodMeshes;  results : Path
+    reconstruction : {name: "texture" or "gouraud"} of surfaces that ask for one, the rest is "auto"
     """
     mean_B = display.mean_radiosity(maps.final, shapes.area[maps.final.surface])
     lamps = _facets(levels[-1], np.flatnonzero(x.E.any(axis=1)), x.E)
@@ -51,7 +52,7 @@ def looks(x, shapes, maps, rho_avg, exposure, levels, results):
         light = display.picture(maps.final.map(k), maps.final.hidden_map(k), maps.E[k], exposure)
         if (light == light[0, 0]).all():
             out.append(Look(gltf.Material(name, colour=_clipped(light[0, 0]))))
-        elif _in_vertices(x.reconstruction[s], light, [level.UV[_vertices(level, s)] for level in levels]):
+        elif _in_vertices(reconstruction.get(name, "auto"), light, [level.UV[_vertices(level, s)] for level in levels]):
             out.append(Look(gltf.Material(name), in_vertices=partial(_from_map, light)))
         else:
             uri = f"textures/{x.files[s]}.png"

@@ -24,7 +24,7 @@ from lib.refusal import Refusal, refusal
 VERSION = 2
 ROOT = Path(__file__).resolve().parents[2]
 _FIELDS = (
-    "settings", "names", "files", "roles", "is_black", "area", "groups", "textures", "rho_avg",
+    "settings", "names", "files", "roles", "is_black", "area", "groups", "tolerances", "reconstruction", "textures", "rho_avg",
     "geometry_files", "texture_files", "slices", "warnings",
 )  # fmt: skip
 
@@ -38,6 +38,7 @@ class Preflight:
     settings : nested dict with every default filled in and units resolved (see settings.resolve)
     names, files, roles, is_black, area : per surface, ordered by name (area in m^2)
     groups : names of the light groups
+    tolerances, reconstruction : {surface: value} of those that ask for their own
     textures : {surface: {"file": absolute path, "colour_space", "repeat": [n, m]}} of the textured ones
     rho_avg : {surface: [r, g, b]}, the average reflectance it shoots with
     geometry_files, texture_files : absolute paths
@@ -55,6 +56,8 @@ class Preflight:
     is_black: list
     area: list
     groups: list
+    tolerances: dict
+    reconstruction: dict
     textures: dict
     rho_avg: dict
     geometry_files: list

@@ -12,14 +12,18 @@ GATHER_RAYS = 0.2  # of a sample, an element of the coarse solution: roughly wha
 MOST_WARNINGS = 100  # told the report: they are part of a command line
 
 
-def rule_settings(settings, warnings=()):
-    """{stage: JSON text} from the resolved settings; sorted keys, so that equal slices are equal texts."""
+def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None):
+    """{stage or shared slice: JSON text} from the resolved settings; sorted keys, so that equal slices are equal texts.
+
+    tolerances, reconstruction : {surface: value} of the surfaces that ask for their own
+    """
     bake = settings["bake"]
     q = chosen_quality(bake)
     light = {"seed": bake["seed"], "bounces": bake["bounces"]}
     threshold = {
         "tolerance": bake["tolerance"],
         "relative_to": bake["relative_to"],
+        "tolerances": tolerances or {},
         "t_direct": q["t_direct"],
         "t_indirect": q["t_indirect"],
     }
@@ -34,9 +38,11 @@ def rule_settings(settings, warnings=()):
         "apply_base_texture": {"texture_level": bake["texture_level"]},
         "budget_reduce": {"budget": settings["budget"], "profile": settings["export"]["profiles"][0]},
         "lod_export": settings["lods"],
-        "package": {"exposure": settings["export"]["exposure"]},
+        "reconstruction": reconstruction or {},
+        "package": {"exposure": settings["export"]["exposure"], "reconstruction": reconstruction or {}},
         "report": {
             "settings": settings,
+            "reconstruction": reconstruction or {},
             "camera": settings["camera"],
             "units": "m",
             "up": settings["up"],

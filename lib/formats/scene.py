@@ -12,9 +12,8 @@ from lib.formats import artefact
 from lib.formats.artefact import ArtefactError
 from lib.nurbs.surface import NurbsSurface
 
-KIND, VERSION = "scene", 1
+KIND, VERSION = "scene", 2
 ROLES = ("full", "cast_only", "receive_only")
-RECONSTRUCTIONS = ("texture", "gouraud", "auto")
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,12 +24,11 @@ class Scene:
     files : n file stems, safe in any file system, e.g. "003-teapot-12"
     surfaces : n NurbsSurface, world metres
     flip : (n,) bool, the lit side is against S_u x S_v
-    role : n of ROLES;  reconstruction : n of RECONSTRUCTIONS;  material : n texts
+    role : n of ROLES;  material : n texts
     E : (n, 3) float64 exitance, linear RGB [W/m^2], >= 0
     group : (n,) int32 index into groups, 0 for surfaces that emit nothing
     groups : names of the light groups, at least one
     is_black : (n,) bool, declared reflectance exactly 0 and no texture
-    tolerance : (n,) float64, refinement tolerance of the surface, NaN where the scene's holds
     up : "y" or "z";  warnings : sentences for the user
     """
 
@@ -43,8 +41,6 @@ class Scene:
     group: np.ndarray
     groups: list
     is_black: np.ndarray
-    reconstruction: list
-    tolerance: np.ndarray
     material: list
     up: str
     warnings: list
@@ -59,25 +55,21 @@ def check(scene, where="scene"):
             raise ArtefactError(f"{where}: {field}: expected {expected}")
 
     demand(n > 0 and list(scene.names) == sorted(set(scene.names)), "names", "at least one, different, ascending")
-    for field in ("files", "surfaces", "role", "reconstruction", "material"):
+    for field in ("files", "surfaces", "role", "material"):
         demand(len(getattr(scene, field)) == n, field, f"{n} entries")
     demand(len(set(scene.files)) == n, "files", "different file stems")
     demand(set(scene.role) <= set(ROLES), "role", " | ".join(ROLES))
-    demand(set(scene.reconstruction) <= set(RECONSTRUCTIONS), "reconstruction", " | ".join(RECONSTRUCTIONS))
     for field, shape, dtype in (
         ("flip", (n,), bool),
         ("E", (n, 3), np.float64),
         ("group", (n,), np.int32),
         ("is_black", (n,), bool),
-        ("tolerance", (n,), np.float64),
     ):
         array = getattr(scene, field)
         demand(array.shape == shape and array.dtype == dtype, field, f"{np.dtype(dtype).name} of shape {shape}")
     demand(np.isfinite(scene.E).all() and (scene.E >= 0).all(), "E", "finite values >= 0")
     n_groups = len(scene.groups)
     demand(n_groups > 0 and 0 <= scene.group.min() and scene.group.max() < n_groups, "group", f"0 to {n_groups - 1}")
-    tolerance = scene.tolerance[~np.isnan(scene.tolerance)]
-    demand((tolerance > 0).all(), "tolerance", "NaN or a value > 0")
     demand(scene.up in ("y", "z"), "up", "y or z")
 
 
@@ -90,7 +82,6 @@ def save(path, scene):
         "files": list(scene.files),
         "role": list(scene.role),
         "groups": list(scene.groups),
-        "reconstruction": list(scene.reconstruction),
         "material": list(scene.material),
         "up": scene.up,
         "warnings": list(scene.warnings),
@@ -100,7 +91,7 @@ def save(path, scene):
         "size": np.array([s.Pw.shape[:2] for s in S], dtype=np.int32),
         "knots": np.concatenate([knots for s in S for knots in (s.knots_u, s.knots_v)]),
         "Pw": np.concatenate([s.Pw.reshape(-1, 4) for s in S]),
-        **{field: getattr(scene, field) for field in ("flip", "E", "group", "is_black", "tolerance")},
+        **{field: getattr(scene, field) for field in ("flip", "E", "group", "is_black")},
     }
     artefact.write(path, KIND, VERSION, header, arrays)
 
@@ -110,7 +101,7 @@ def load(path):
     header, arrays = artefact.read(path, KIND, VERSION)
     try:
         surfaces = _surfaces(arrays.pop("degree"), arrays.pop("size"), arrays.pop("knots"), arrays.pop("Pw"))
-        fields = ("names", "files", "role", "groups", "reconstruction", "material", "up", "warnings")
+        fields = ("names", "files", "role", "groups", "material", "up", "warnings")
         scene = Scene(surfaces=surfaces, **{field: header[field] for field in fields}, **arrays)
     except (KeyError, TypeError, ValueError) as error:
         raise ArtefactError(f"{path}: damaged ({error}); delete it to have it made again") from error

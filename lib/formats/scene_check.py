@@ -23,6 +23,7 @@ from lib.nurbs.tessellate import frame
 from lib.refusal import Refusal
 
 DIGITS = 4  # of an average reflectance: a repainted texture whose average moves less re-bakes nothing
+AUTO = "auto"  # the reconstruction of surfaces that ask for none
 BRIGHT = 0.95  # reflectances above are allowed but rarely meant; shots grow as 1 / (1 - rho)
 LINEAR = (".exr", ".hdr")
 
@@ -67,6 +68,8 @@ def run(folder, overrides=None):
         "is_black": made.is_black.tolist(),
         "area": [area[name] for name in made.names],
         "groups": made.groups,
+        "tolerances": {name: row["tolerance"] for name, row in table.items() if row["tolerance"] is not None},
+        "reconstruction": {name: row["reconstruction"] for name, row in table.items() if row["reconstruction"] != AUTO},
         "textures": textures,
         "rho_avg": rho_avg,
         "geometry_files": [str(source.folder / name) for name in digests],

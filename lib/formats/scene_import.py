@@ -17,6 +17,7 @@ from lib.refusal import refusal
 GEOMETRY_KEYS = (
     "name", "rectangle", "quadrangle", "triangle", "nurbs", "file", "units", "place", "only", "trimmed", "flip",
 )  # fmt: skip
+SURFACE_KEYS = ("role", "turn", "material", "E", "group", "is_black")  # not how finely it is refined or exported
 MOST_TOLD = 8  # pairs of surfaces a warning names
 
 
@@ -27,7 +28,7 @@ def geometry_slice(settings, table, digests):
         "up": settings["up"],
         "geometry": [{key: entry[key] for key in GEOMETRY_KEYS if key in entry} for entry in settings["geometry"]],
         "digests": digests,
-        "surfaces": table,
+        "surfaces": {name: {key: row[key] for key in SURFACE_KEYS} for name, row in table.items()},
     }
 
 
@@ -68,10 +69,6 @@ def assemble(placed, notes, table, up):
         group=np.array(group, dtype=np.int32),
         groups=groups,
         is_black=np.array([row["is_black"] for row in rows], dtype=bool),
-        reconstruction=[row["reconstruction"] for row in rows],
-        tolerance=np.array(
-            [np.nan if row["tolerance"] is None else row["tolerance"] for row in rows], dtype=np.float64
-        ),
         material=[row["material"] for row in rows],
         up=up,
         warnings=warnings,

@@ -12,6 +12,8 @@ as measured against path traced references.
 
 from dataclasses import asdict, dataclass
 
+import numpy as np
+
 
 @dataclass(frozen=True)
 class Quality:
@@ -43,7 +45,7 @@ def quality(tolerance, max_level=8):
     """
     ratio = tolerance / 0.01
     elements = 4000 if tolerance >= 0.0075 else 16000 if tolerance >= 0.004 else 40000
-    rays = _multiple_of_16(960 * ratio ** (-1.25 if ratio < 1 else -2.0), 32, 4096)
+    rays = _multiple_of_16(gather_rays(960, ratio), 32, 4096)
     n1 = 32 if tolerance >= 0.015 else 64 if tolerance >= 0.0075 else 256
     return Quality(
         n_elements=elements,
@@ -57,6 +59,15 @@ def quality(tolerance, max_level=8):
         base_indirect=3,
         top=max_level,
     )
+
+
+def gather_rays(rays, ratio):
+    """Rays for a tolerance `ratio` times the one that `rays` are for; numbers or arrays.
+
+    Errors fall like rays^-0.8; above 1 the other parts of the model leave the gather more.
+    """
+    ratio = np.asarray(ratio, dtype=np.float64)
+    return rays * ratio ** np.where(ratio < 1, -1.25, -2.0)
 
 
 def _multiple_of_16(x, low, high):

@@ -71,7 +71,8 @@ def refine_direct(world, base, seed, tau, top, shadow_rays):
 def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
     """Indirect trees of `surfaces`, by gather rays through the LookupTable: {surface: Quadtree}.
 
-    solution : has spread, H_element, n_u, n_v, first; K gather rays for a large cell of usual surroundings.
+    solution : has spread, H_element, n_u, n_v, first; K (surfaces,) gather rays
+    for a large cell of usual surroundings.
     """
     trees = {
         s: Quadtree(world.lattices[s], world.base_level(s, level), world.channels, world.side(s)) for s in surfaces
@@ -85,7 +86,7 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
             np.zeros(n, np.float32),
             np.zeros(n, np.float32),
         )
-        rays = rays_for(points.cell, contrast_at(points, solution), K)
+        rays = rays_for(points.cell, contrast_at(points, solution), K[points.surface])
         for k in np.unique(rays):
             of = np.flatnonzero(rays == k)
             light = indirect_light(
@@ -102,11 +103,11 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
 def rays_for(cell, contrast, K):
     """Gather rays of samples: K for cells of LARGE_CELL where the light around varies by USUAL_CONTRAST.
 
-    cell, contrast (n,).  With variance ~ contrast^2 rays^-1.6, the sum of area x variance is least for a given number
+    cell, contrast, K (n,).  With variance ~ contrast^2 rays^-1.6, the sum of area x variance is least for a given number
     of rays when rays ~ (area contrast^2)^(1/2.6).  Rounded to sizes that share a batch.
     """
     need = K * np.minimum(1.0, cell / LARGE_CELL) ** (2 / 2.6) * (contrast / USUAL_CONTRAST) ** (2 / 2.6)
-    need = np.clip(need, max(LEAST_RAYS, K / 8), 4 * K)
+    need = np.clip(need, np.maximum(LEAST_RAYS, K / 8), 4 * K)
     return (16 * np.round(2 ** (np.round(2 * np.log2(need)) / 2) / 16)).astype(np.int64)
 
 

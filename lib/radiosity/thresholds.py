@@ -3,17 +3,22 @@
 import numpy as np
 
 
-def thresholds(solution, tolerance, half, settings):
+def own_share(names, settings):
+    """(n,) tolerance of each surface over the scene's: 1 but where settings["tolerances"] names the surface."""
+    own = settings["tolerances"]
+    return np.array([own.get(name, settings["tolerance"]) for name in names], dtype=np.float64) / settings["tolerance"]
+
+
+def thresholds(solution, own, half, settings):
     """{surface: tau [W/m^2]}.
 
-    solution : has H_indirect, share, n_u, n_v, first, mean_H and H_surface (n, 3), the surfaces' own mean irradiance
-    tolerance : (n,) overrides, nan where the scene's holds; half "direct" or "indirect"
+    solution : has mean_H (3,) and H_surface (n, 3), the scene's and the surfaces' own mean irradiance
+    own : (n,) of own_share; half "direct" or "indirect"
     settings : tolerance, t_direct, t_indirect, relative_to ("scene" or "surface")
 
     A mean of 0 (no light) gives a threshold that nothing exceeds.
     """
     t = settings["t_direct"] if half == "direct" else settings["t_indirect"]
-    own = np.nan_to_num(np.asarray(tolerance, dtype=np.float64) / settings["tolerance"], nan=1.0)
     mean = float(np.max(solution.mean_H))
     means = np.full(len(own), mean)
     if settings["relative_to"] == "surface":

@@ -6,17 +6,18 @@ from lib.maps.budget import gpu_bytes
 from lib.report.thumbnails import overlay_count
 
 
-def rows(scene, trees, maps, textures, D_i, mean_H):
+def rows(scene, trees, maps, textures, D_i, mean_H, reconstruction):
     """Rows of all surfaces, in their order.
 
     Parameters
     ----------
-    scene : has names, files, role, reconstruction, material (lists) and is_black, E
+    scene : has names, files, role, material (lists) and is_black, E
     trees : list of {surface: Tree}, direct and indirect ones, as far as there are any
     maps : MapSet of the light at full size, or None
     textures : MapSet as exported, within the budget, or None
     D_i : {name: the paper's D_i of the map before the budget}
     mean_H : mean irradiance of the scene, over channels [W/m^2]; errors are relative to it
+    reconstruction : {surface name: "texture" or "gouraud"} of those that ask for one
     """
     place = [{int(s): k for k, s in enumerate(m.surface)} if m is not None else {} for m in (maps, textures)]
     sizes = [np.stack(m.sizes(), axis=1) if m is not None else None for m in (maps, textures)]
@@ -32,7 +33,7 @@ def rows(scene, trees, maps, textures, D_i, mean_H):
                 "name": name,
                 "file": scene.files[s],
                 "role": scene.role[s],
-                "reconstruction": scene.reconstruction[s],
+                "reconstruction": reconstruction.get(name, "auto"),
                 "material": scene.material[s],
                 "is_black": bool(scene.is_black[s]),
                 "is_light": bool(np.max(scene.E[s]) > 0),

@@ -60,7 +60,7 @@ def test_a_total_is_that_of_each_placed_object(tmp_path):
 
 
 def test_later_patterns_win_and_flip_turns(tmp_path):
-    table = rows(
+    found = check(
         tmp_path,
         "geometry:",
         "- {name: wall/left, rectangle: {origin: [0, 0, 0], u: [1, 0, 0], v: [0, 1, 0]}, role: cast_only}",
@@ -70,10 +70,13 @@ def test_later_patterns_win_and_flip_turns(tmp_path):
         '  "wall/r*": {flip: false, material: red}',
         "materials: {red: {reflectance: [0.6, 0, 0]}}",
     )
+    table = found.slices["geometry"]["surfaces"]
     left, right = table["wall/left"], table["wall/right"]
-    assert (left["role"], left["turn"], left["material"], left["tolerance"]) == ("receive_only", True, "default", 0.05)
+    assert (left["role"], left["turn"], left["material"]) == ("receive_only", True, "default")
     assert (right["role"], right["turn"], right["material"]) == ("receive_only", False, "red")
-    assert (left["reconstruction"], right["reconstruction"]) == ("auto", "gouraud")
+    assert found.outcome["reconstruction"] == {"wall/right": "gouraud"}
+    assert found.outcome["tolerances"] == {"wall/left": 0.05, "wall/right": 0.05}
+    assert not {"tolerance", "reconstruction"} & set(left)  # a change of them does not move what is imported
 
 
 def test_black_is_a_declared_zero_and_lights_are_black_unless_they_say_otherwise(tmp_path):

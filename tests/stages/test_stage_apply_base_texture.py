@@ -35,8 +35,6 @@ def build(folder, H=None, hidden=None, codes=None):
             group=np.array([1, 0, 0], np.int32),
             groups=["day", "night"],
             is_black=np.zeros(3, bool),
-            reconstruction=["auto"] * 3,
-            tolerance=np.full(3, np.nan),
             material=names,
             up="z",
             warnings=[],

@@ -46,11 +46,12 @@ def test_the_scene_is_that_of_preflight(home, capsys):
     assert (made.names, made.files, made.role, made.groups) == (found.names, found.files, found.roles, found.groups)
     assert made.is_black.tolist() == found.is_black
     index = {name: k for k, name in enumerate(made.names)}
+    assert found.tolerances["pot.2/05"] == 0.05 and found.reconstruction["pot.2/05"] == "gouraud"
+    assert len(found.tolerances) == len(found.reconstruction) == 32  # the patches of one pot, nothing else
     assert made.role[index["craft/1"]] == "cast_only" and made.groups == ["evening"]
     crafts = made.flip[[index["craft/1"], index["craft/2"]]]
     assert crafts.tolist().count(True) == 1  # one half is reversed in the file, the mirror turns both
     assert not made.flip[index["pot.1/05"]] and made.flip[index["pot.2/05"]]
-    assert made.reconstruction[index["pot.2/05"]] == "gouraud" and made.tolerance[index["pot.2/05"]] == 0.05
     E = made.E[index["lamp"]]
     assert 683 * E @ [0.2126, 0.7152, 0.0722] * 0.5 == pytest.approx(800)
     assert np.ptp(made.surfaces[index["floor"]].P, axis=(0, 1)) == pytest.approx([4, 3, 0])

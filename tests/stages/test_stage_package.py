@@ -48,11 +48,13 @@ def files(tmp_path):
     return tmp_path
 
 
-def run(files, settings=None, n_levels=2, results="results"):
+def run(files, settings=None, n_levels=2, results="results", ways=None):
+    """Package the files; ways: {surface index: reconstruction}, else "texture"."""
+    settings = {**(settings or {}), "reconstruction": by_name(files, ways or {})}
     argv = []
     for option in ("scene", "casters", "textures"):
         argv += [f"--{option}", str(files / f"{option}.npz")]
-    argv += ["--materials", str(files / "materials.json"), "--settings", json.dumps(settings or {})]
+    argv += ["--materials", str(files / "materials.json"), "--settings", json.dumps(settings)]
     argv += ["--lods", *(str(files / f"lod_{k}.npz") for k in range(n_levels))]
     return package.main([*argv, "--results", str(files / results)]), files / results
 
@@ -119,11 +121,13 @@ def test_exposure_takes_the_brightest_reflected_percent_to_white(files):
     assert exposure.automatic(dark, np.ones(1)) == 1.0
 
 
+def by_name(files, ways):
+    return {name: ways.get(s, "texture") for s, name in enumerate(scene.load(files / "scene.npz").names)}
+
+
 def reconstruct(files, ways, level=2):
-    """Store the scene and maps again with reconstructions {surface index: way}; cut the levels with the maps known."""
-    x = scene.load(files / "scene.npz")
-    x.reconstruction[:] = [ways.get(s, "texture") for s in range(len(x.names))]
-    scene.save(files / "scene.npz", x)
+    """Store the maps again, cut the levels with the maps known; ways: {surface index: reconstruction}, else "texture"."""
+    chosen = by_name(files, ways)
     maps = textured_maps.load(files / "textures.npz")
     if level == 0:
         corners = np.array([[[0.1, 0.1, 0.1], [0.3, 0.2, 0.1]], [[0.2, 0.2, 0.2], [0.4, 0.3, 0.2]]])
@@ -132,14 +136,15 @@ def reconstruct(files, ways, level=2):
         textured_maps.save(files / "textures.npz", maps)
     argv = ["--scene", files / "scene.npz", "--casters", files / "casters.npz", "--textures", files / "textures.npz"]
     for k in range(len(LEVELS)):
-        more = ["--levels", json.dumps(LEVELS), "--level-index", k, "--out", files / f"lod_{k}.npz"]
+        more = ["--levels", json.dumps(LEVELS), "--level-index", k, "--reconstruction", json.dumps(chosen)]
+        more += ["--out", files / f"lod_{k}.npz"]
         assert lod_export.main([str(a) for a in (*argv, *more)]) == 0
     return maps
 
 
 def test_gouraud_puts_the_map_into_vertices_on_its_lattice(files):
     maps = reconstruct(files, {7: "gouraud"})
-    _, results = run(files, {"exposure": 2.0})
+    _, results = run(files, {"exposure": 2.0}, ways={7: "gouraud"})
     assert read_json(results / "lods.json")["in_vertices"] == ["ball", "picture"]
     assert [p.name for p in (results / "textures").iterdir()] == ["001-s.png"]
     for k in (0, 1):
@@ -152,10 +157,10 @@ def test_gouraud_puts_the_map_into_vertices_on_its_lattice(files):
 
 def test_auto_uses_vertices_only_where_nothing_shows(files):
     reconstruct(files, {1: "auto", 7: "auto"})
-    _, results = run(files)
+    _, results = run(files, ways={1: "auto", 7: "auto"})
     assert read_json(results / "lods.json")["in_vertices"] == ["ball"]
     reconstruct(files, {2: "auto", 7: "auto"}, level=0)
-    _, results = run(files)
+    _, results = run(files, ways={2: "auto", 7: "auto"})
     assert read_json(results / "lods.json")["in_vertices"] == ["ball", "box/2", "picture"]
     [part] = [p for p in exported.load(results / "scene.glb")[0] if p.name == "picture"]
     assert len(part.F) == 2 and part.colour is not None

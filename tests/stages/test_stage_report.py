@@ -49,8 +49,6 @@ def make(folder):
             np.zeros(3, np.int32),
             ["all"],
             np.array([False, False, True]),
-            ["auto"] * 3,
-            np.full(3, np.nan),
             ["m"] * 3,
             "z",
             ["from the scene"],

@@ -27,8 +27,6 @@ def small_scene(scale=1.0, flip=()):
         group=np.zeros(n, np.int32),
         groups=["all"],
         is_black=np.zeros(n, bool),
-        reconstruction=["texture"] * n,
-        tolerance=np.full(n, np.nan),
         material=["white"] * n,
         up="z",
         warnings=[],
