@@ -10,6 +10,7 @@ import numpy as np
 
 SAME = 1e-6  # of the scene's size: float32 rays can not tell
 LEAST = 1e-6  # share of the smaller surface that must be covered
+UPWARDS = np.array([0.43, 0.57, 0.70])  # tells the two sides of a plane apart; hardly any plane contains it
 
 
 def coincident(surfaces, flip, size):
@@ -22,6 +23,18 @@ def coincident(surfaces, flip, size):
     flat = [k for k, s in enumerate(surfaces) if s.Pw.shape[:2] == (2, 2)]
     pairs = set(_overlapping(surfaces, flip, size, np.array(flat, dtype=int)))
     return sorted(pairs | set(_equal(surfaces, flip, size)))
+
+
+def back_to_back(surfaces, flip, size):
+    """(n,) bool: flat surfaces that overlap another one in their plane, lit on its other side.
+
+    A wall of two sheets, a box on a floor: a ray may meet the back of one before the front of the other.
+    """
+    flat = np.array([k for k, s in enumerate(surfaces) if s.Pw.shape[:2] == (2, 2)], dtype=int)
+    out = np.zeros(len(surfaces), dtype=bool)
+    for pair in _overlapping(surfaces, flip, size, flat, opposite=True):
+        out[list(pair)] = True
+    return out
 
 
 def _equal(surfaces, flip, size):
@@ -37,8 +50,8 @@ def _equal(surfaces, flip, size):
                     yield a, b
 
 
-def _overlapping(surfaces, flip, size, flat):
-    """Pairs of planar quadrangles in one plane, lit on the same side, whose interiors meet."""
+def _overlapping(surfaces, flip, size, flat, opposite=False):
+    """Pairs of planar quadrangles in one plane, lit on the same side (or opposite ones), whose interiors meet."""
     if flat.size < 2:
         return
     C = np.array([surfaces[k].P.reshape(4, 3)[[0, 2, 3, 1]] for k in flat])  # in their round
@@ -46,12 +59,14 @@ def _overlapping(surfaces, flip, size, flat):
     N = np.cross(C[:, 2] - C[:, 0], C[:, 3] - C[:, 1])
     area = np.linalg.norm(N, axis=1) / 2
     N *= np.where(np.asarray(flip)[flat], -1.0, 1.0)[:, None] / (2 * np.maximum(area, 1e-300))[:, None]
+    side = np.where(opposite & (N @ UPWARDS < 0), -1.0, 1.0)
+    N *= side[:, None]
     d = np.einsum("kc,kc->k", N, C.mean(axis=1))
     planar = (np.abs(np.einsum("kpc,kc->kp", C, N) - d[:, None]).max(axis=1) <= SAME) & (area > 0)
     index = np.flatnonzero(planar)
     for group in _groups(np.concatenate([N, d[:, None]], axis=1)[index], 2 * SAME):
         for a, b in _boxes_that_meet(C.min(axis=1), C.max(axis=1), index[group]):
-            if _overlap(C[a], C[b], N[a]) > LEAST * min(area[a], area[b]):
+            if opposite == (side[a] != side[b]) and _overlap(C[a], C[b], N[a]) > LEAST * min(area[a], area[b]):
                 yield tuple(sorted((int(flat[a]), int(flat[b]))))
 
 

@@ -2,6 +2,7 @@
 mesh.
 """
 
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from lib.elements.chunks import members
 from lib.elements.grids import element_grids
 from lib.elements.lattice import Lattice, roots_of
+from lib.nurbs.coincident import back_to_back
 from lib.nurbs.evaluate import frame_grid
 from lib.nurbs.shape import transformed
 from lib.radiosity.emitters import gather_emitters
@@ -17,6 +19,7 @@ from lib.visibility.tracer import Tracer
 
 FINEST = 10  # positions are hashed on this level's lattice: a crossing draws the same rays at whatever level it is met
 LARGE = 0.25  # root cells from this side on, in the scene's largest side, start their trees in full
+APART = 2e-5  # in the frame: more than float32 rays err by, less than their origins are lifted
 TURN = 0.6  # radians between normals of neighbouring base samples: beyond, light that depends on direction is missed
 
 
@@ -29,7 +32,7 @@ def _steepest(N):
 class World:
     """What sample and refine need of a scene.
 
-    scene : has names, surfaces (world units), flip, role, E, group, groups, is_black, tolerance
+    scene : has names, surfaces (world units), flip, role, E, group, groups, is_black
     casters : has centre, scale, V, F, UV, face_surface, sag, area, extent, is_planar, is_closed, is_collapsed, shell
     """
 
@@ -75,12 +78,26 @@ class World:
         """All emitters, in the scene's frame; cast_only ones shine too."""
         lit = np.asarray(self.scene.E).max(axis=1, initial=0.0) > 0
         surfaces = [self.surface(s) if lit[s] else None for s in range(self.n)]
-        return gather_emitters(surfaces, self.scene.flip, self.scene.E, self.scene.group)
+        found = gather_emitters(surfaces, self.scene.flip, self.scene.E, self.scene.group)
+        return replace(found, is_curved=found.is_curved | self._is_back_to_back[found.surface])
 
     @cached_property
     def tracer(self):
-        """Rays against the caster mesh."""
-        return Tracer(self.casters.V, self.casters.F)
+        """Rays against the caster mesh.
+
+        Sheets that stand back to back in one plane are moved apart, each towards its lit side: otherwise which of them
+        a ray meets is a matter of rounding.
+        """
+        c = self.casters
+        face = self._is_back_to_back[c.face_surface]
+        V = np.array(c.V)
+        vertex, first = np.unique(c.F[face], return_index=True)
+        V[vertex] += APART * self.mesh.normal[face][first // 3]
+        return Tracer(V, c.F)
+
+    @cached_property
+    def _is_back_to_back(self):
+        return back_to_back([self.surface(s) for s in range(self.n)], self.scene.flip, 1.0)
 
     @cached_property
     def mesh(self):

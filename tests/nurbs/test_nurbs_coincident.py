@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from lib.nurbs.coincident import coincident
+from lib.nurbs.coincident import back_to_back, coincident
 from lib.nurbs.shape import transformed
 from lib.nurbs.surface import bezier, bilinear
 
@@ -63,3 +63,26 @@ def test_a_curved_surface_twice():
 def test_a_floor_of_many_tiles_takes_no_time():
     tiles = [square(i, j, 0) for i in range(40) for j in range(40)]
     assert found(*tiles, square(3.2, 3.2, 0, 0.5), size=40.0) == [(123, 1600)]
+
+
+@pytest.mark.parametrize("turn", np.linspace(0, 3, 7))
+def test_sheets_back_to_back(turn):
+    """A wall of two sheets, a box on a floor; not what faces the same way, lies apart, or shares an edge."""
+    c, s = np.cos(turn), np.sin(turn)
+    M = np.array([[c, -s * c, s * s, 3], [s, c * c, -s * c, 1], [0, s, c, 2], [0, 0, 0, 1]])
+    surfaces = [
+        square(0, 0, 0, 5),  # the floor
+        square(1, 1, 0, up=False),  # below a box
+        square(3, 3, 0),  # a carpet, turned by its flip
+        square(3, 1, 0),  # a carpet that lies in the floor
+        square(5, 0, 0, up=False),  # beside the floor
+        square(1, 1, -0.001, up=False),
+    ]
+    flip = np.array([False, False, True, False, False, False])
+    found = back_to_back([transformed(x, M) for x in surfaces], flip, 6.0)
+    assert found.tolist() == [True, True, True, False, False, False]
+
+
+def test_single_sheets_are_not_back_to_back():
+    assert back_to_back([square(0, 0, 0)], np.zeros(1, bool), 1.0).tolist() == [False]
+    assert not back_to_back([], np.zeros(0, bool), 1.0).any()

@@ -111,6 +111,18 @@ def test_a_caster_adds_nothing_and_a_picture_takes_nothing(tmp_path):
     assert maps["sheet"][0].min() > alone["floor"][0].max()  # nearer to the lamp
 
 
+@pytest.mark.parametrize("axis", [0, 2])
+def test_two_rooms_with_one_wall_of_two_sheets(tmp_path, axis):
+    """Both are furnaces of their own: whose wall a ray meets is not left to rounding, nor is anything buried."""
+    beside = np.eye(4)
+    beside[axis, 3] = 1
+    near, far = cube(1.0, E=1.0), cube(1.0, E=1.0)
+    rooms = {f"far {k}": (transformed(face, beside), facts) for k, (face, facts) in far.items()} | near
+    for H, hidden in baked(tmp_path, rooms, 0.5).values():
+        assert not hidden.any()
+        assert H * 0.5 == pytest.approx(np.ones(H.shape), rel=0.01)
+
+
 def test_a_room_behind_a_wall_without_thickness_is_exactly_dark(tmp_path):
     """A lit box, and a room that leans against its wall: the five surfaces of the room stay 0, bounces included."""
     rooms = cube(1.0)
