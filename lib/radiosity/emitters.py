@@ -1,7 +1,9 @@
 """Emitting surfaces as flat facets: what direct light is computed from.
 
-A flat parallelogram is one facet.  A curved emitter is triangles over a uv grid fine enough for its shape; each
-carries the exact area of its piece of surface, so the power is that of the exact surface.
+A flat parallelogram is one facet.  A curved emitter is triangles over a uv grid fine enough for its shape.  Where it is
+convex on the side that shines, each carries the exact area of its piece of surface, so the power is that of the exact
+surface.  A hollow is seen from within, by its outline and not by its area: there they lie at the mean height of their
+piece of surface and count as they are.
 """
 
 from dataclasses import dataclass
@@ -9,9 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from lib.nurbs import shape
-from lib.nurbs.evaluate import evaluate_grid
+from lib.nurbs.evaluate import evaluate_grid, frame_grid
 
-FLATNESS = 0.01  # chord error of the facets, as a share of the emitter's size
+FLATNESS = 0.01  # chord error of the facets, as a share of the size of the lines they follow
+MEAN_HEIGHT = 2 / 3  # of a paraboloid above the chords of a small cell, in units of its height above the cell's middle
+HOLLOW = 1e-6  # least such height, as a share of the emitter's size
 MOST_CELLS = 16  # along one direction
 
 
@@ -19,7 +23,7 @@ MOST_CELLS = 16  # along one direction
 class Facets:
     """k facets origin + a e1 + b e2 (k, 3 each): parallelograms with a, b in [0, 1], or triangles with a + b <= 1.
 
-    normal (k, 3) the emitting side, area (k,), weight (k,) exact area of the piece over the facet's.
+    normal (k, 3) the emitting side, area (k,), weight (k,) exact area of the piece over the facet's, 1 in hollows.
     """
 
     origin: np.ndarray
@@ -60,20 +64,24 @@ def facets_of(surface, flip=False):
     """Facets of one surface, emitting along N (negated where `flip`)."""
     cells_u, cells_v = _cells(surface)
     u, v = np.linspace(0, 1, cells_u + 1), np.linspace(0, 1, cells_v + 1)
-    S = evaluate_grid(surface, u, v)[0]
-    S00, S10, S01, S11 = S[:-1, :-1], S[:-1, 1:], S[1:, :-1], S[1:, 1:]
-    exact = _cell_areas(surface, u, v)
+    S, N = frame_grid(surface, u, v)
+    S00, S10, S01, S11 = _cell_corners(S)
+    exact, is_hollow = _cell_areas(surface, u, v), np.zeros((cells_v, cells_u), dtype=bool)
     size = np.ptp(S.reshape(-1, 3), axis=0).max()
     if cells_u == cells_v == 1 and np.abs(S00 + S11 - S10 - S01).max() <= 1e-9 * size:
         origin, e1, e2 = S00, S10 - S00, S01 - S00
         triangle = np.zeros(1, dtype=bool)
         exact = exact[None]
     else:
+        height = _heights(surface, u, v, S)
+        is_hollow = height * (-1.0 if flip else 1.0) < -HOLLOW * size
+        rise = MEAN_HEIGHT * np.where(is_hollow, height, 0.0)[..., None]
+        S00, S10, S01, S11 = (c + rise * n for c, n in zip(_cell_corners(S), _cell_corners(N), strict=True))
         origin = np.stack([S00, S11])
         e1, e2 = np.stack([S10 - S00, S01 - S11]), np.stack([S01 - S00, S10 - S11])
         triangle = np.ones(2 * exact.size, dtype=bool)
         part = np.linalg.norm(np.cross(e1, e2), axis=-1)
-        exact = exact * part / np.maximum(part.sum(axis=0), 1e-300)
+        exact, is_hollow = exact * part / np.maximum(part.sum(axis=0), 1e-300), np.stack([is_hollow, is_hollow])
     origin, e1, e2, exact = origin.reshape(-1, 3), e1.reshape(-1, 3), e2.reshape(-1, 3), exact.ravel()
     cross = np.cross(e1, e2)
     length = np.linalg.norm(cross, axis=1)
@@ -82,18 +90,31 @@ def facets_of(surface, flip=False):
     normal = cross[keep] / length[keep, None] * (-1.0 if flip else 1.0)
     weight = exact[keep] / area
     weight *= exact.sum() / (weight @ area)
+    weight[is_hollow.ravel()[keep]] = 1.0
     return Facets(origin[keep], e1[keep], e2[keep], triangle[keep], normal, area, weight)
 
 
+def _cell_corners(S):
+    """Corners (0, 0), (1, 0), (0, 1), (1, 1) of the cells of a grid, each (h - 1, w - 1, 3)."""
+    return S[:-1, :-1], S[:-1, 1:], S[1:, :-1], S[1:, 1:]
+
+
+def _heights(surface, u, v, S):
+    """Heights of the surface along its normal above the means of the cells' corners, in the middle of the cells."""
+    middle, N = frame_grid(surface, (u[:-1] + u[1:]) / 2, (v[:-1] + v[1:]) / 2)
+    return ((middle - sum(_cell_corners(S)) / 4) * N).sum(axis=2)
+
+
 def _cells(surface):
-    """Cells along u and v, powers of two, so that chords along each stay within FLATNESS of the size."""
+    """Cells along u and v, powers of two: chords along each stay within FLATNESS of the size of the lines they follow,
+    so a tube stays round however long it is."""
     if not _is_bent(surface):
         return 1, 1
     t = np.linspace(0, 1, 2 * MOST_CELLS + 1)
     S = evaluate_grid(surface, t, t)[0]
-    bound = FLATNESS * np.ptp(S.reshape(-1, 3), axis=0).max()
     cells = []
     for axis in (1, 0):
+        bound = FLATNESS * np.ptp(S, axis=axis).max()
         n = 1
         while n < MOST_CELLS:
             step = 2 * MOST_CELLS // n

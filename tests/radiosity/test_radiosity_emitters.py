@@ -56,6 +56,21 @@ def test_facets_stay_close_to_the_surface():
     assert np.linalg.norm(facets.centre, axis=1).min() > 0.5 - 0.02
 
 
+def test_a_hollow_fills_the_view_from_within():
+    """From the middle of a sphere that shines inwards the facets around the equator are as far out as in, weight 1."""
+    facets = facets_of(sphere(0.5), flip=True)
+    corners = np.linalg.norm(facets.corners(), axis=2)
+    assert 0.5 < corners.min() and corners.max() < 0.51
+    assert 0.49 < np.linalg.norm(facets.centre, axis=1).min() < 0.5
+    assert (facets.weight == 1).all()
+
+
+def test_a_tube_is_round_however_long():
+    facets = facets_of(cylinder(1e-3, 1.0))
+    assert facets.weight @ facets.area == pytest.approx(2e-3 * np.pi, rel=1e-6)
+    assert facets.weight == pytest.approx(np.ones(len(facets.weight)), abs=0.01)
+
+
 def test_corners_and_centres():
     facets = facets_of(rectangle([1, 1, 1], [2, 0, 0], [0, 4, 0]))
     assert facets.corners()[0].tolist() == [[1, 1, 1], [3, 1, 1], [3, 5, 1], [1, 5, 1]]
