@@ -2,7 +2,7 @@
 
 EXACT = 1e-12  # float64 through a few dozen operations on numbers near 1
 QUADRATURE = 1e-9  # composite Gauss-Legendre of lib.nurbs.shape on rational quadrics
-LIMIT = 1e-6  # a normal at a pole against the limit from inside, as HARD_CASES demands
+LIMIT = 1e-6  # a normal at a pole against the limit from inside
 FLOAT32 = 2e-6  # sums of a few dozen float32 numbers near 1
 STANDARD_ERRORS = 4  # noise: a fair estimate departs further in 1 of 16000 cases
 FACETED = 0.02  # a curved emitter is facets within 1 % of its size: its outline errs by twice that in area

@@ -10,7 +10,7 @@ from lib.nurbs.surface import bilinear, from_points
 
 ROUND = 1e-6  # float32 maps
 QUADRATURE = 2e-4  # midpoint rule on 128 cells of a quarter period each: (pi/2/128)^2 and the picture's own pixels
-ENERGY = 1e-3  # what HARD_CASES allows after scaling
+ENERGY = 1e-3  # relative, of the area mean after scaling
 
 
 def unit_square():
