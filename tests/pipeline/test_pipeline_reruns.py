@@ -65,6 +65,15 @@ def test_a_repainted_texture_of_equal_average(baked):
         path.write_bytes(before)
 
 
+def test_a_lost_map_is_made_again(baked):
+    path = baked.results / "maps" / "001-dome.exr"
+    path.rename(baked.results / "away.exr")
+    try:
+        assert baked.listed().keys() == {"apply_base_texture", "budget_reduce", "package", "report"}
+    finally:
+        (baked.results / "away.exr").rename(path)
+
+
 @pytest.mark.parametrize(
     "module, expected",
     [
