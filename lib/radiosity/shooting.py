@@ -182,31 +182,36 @@ def _round_trip(rho, area, F):
 
 
 def _sweep(H_direct, H, rho, area, F, residual):
-    """Gather until what is to come, summed as a geometric series, is below `residual` of the mean.
+    """Gather until what is to come, summed as a geometric series, is below `residual`, on the mean of all lit elements.
 
-    The first changes are the noise of shooting, gone after a few sweeps; light that goes round a room dies slowest, by
-    about the mean reflectance a sweep.  So the series is summed with the slowest of that ratio, the last one seen and
-    the one it rises to.  Each sweep also adds the even light, over all elements that have any, that takes most from the
-    changes to come (least squares): where they end stays the same, and what is dark stays dark.
+    Changes count relative to the light of each element: a dim room converges like the bright one beside it.  The first
+    of them are the noise of shooting, gone after a few sweeps; light that goes round a room dies slowest, by about the
+    mean reflectance a sweep.  So the series is summed with the slowest of that ratio, the last one seen and the one it
+    rises to.  After each sweep the light is scaled by what leaves least to change (least squares): (1 + t) H leaves
+    change + t (change - H_direct).  Where it ends stays the same, and what is dark stays dark.
     """
     column = area[:, None]
-    even = (H > 0).astype(np.float64)
-    lost = even - F.gather(rho * even)  # by one sweep
-    weight = np.maximum((column * lost * lost).sum(axis=0), 1e-300)
     slow = float(_round_trip(rho, area, F).max(initial=0.0))
     change = H_direct + F.gather(rho * H) - H
-    previous, before = np.abs(change).sum(), 0.0
+    previous, before = _relative(change, H), 0.0
     for sweep in range(1, MOST_SWEEPS + 1):
-        onward = F.gather(rho * change)
-        share = (column * lost * onward).sum(axis=0) / weight
-        H = H + change + share * even
-        change = onward - share * lost
-        size, scale = np.abs(change).sum(), max(np.abs(H).sum(), 1e-300)
+        H, change = H + change, F.gather(rho * change)
+        turn = change - H_direct
+        t = -(column * change * turn).sum(axis=0) / np.maximum((column * turn * turn).sum(axis=0), 1e-300)
+        H, change = H * (1 + t), change + t * turn
+        size = _relative(change, H)
         q = size / previous if previous else 0.0
         bound = max(q, 2 * q - before, slow)  # the ratio rises while faster light dies
         previous, before = size, q
-        if size == 0 or (sweep >= LEAST_SWEEPS and bound < 1 and size / (1 - bound) < residual * scale):
+        if size == 0 or (sweep >= LEAST_SWEEPS and bound < 1 and size / (1 - bound) < residual):
             return np.maximum(H, H_direct), sweep
         if not np.isfinite(size) or (sweep > 50 and q > 1):
             raise DoesNotConverge("light grows with every bounce")
-    raise DoesNotConverge(f"{MOST_SWEEPS} sweeps still change the light by {size / scale:.3g}")
+    raise DoesNotConverge(f"{MOST_SWEEPS} sweeps still change the light by {size:.3g}")
+
+
+def _relative(change, H):
+    """Mean of |change| over the light of each element, of those that have any."""
+    size = np.abs(change)
+    lit = size + np.abs(H)
+    return float((size / np.where(lit > 0, lit, 1.0)).sum() / max((lit > 0).sum(), 1))

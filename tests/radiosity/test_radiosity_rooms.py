@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from lib.nurbs.evaluate import frame
 from lib.nurbs.shape import transformed
 from lib.radiosity.form_factors import form_factor_polygon
 from tests.rooms import baked, cube
@@ -109,6 +110,30 @@ def test_a_caster_adds_nothing_and_a_picture_takes_nothing(tmp_path):
     assert sorted(maps) == ["floor", "sheet"]
     assert maps["floor"][0] == pytest.approx(alone["floor"][0], rel=1e-4)
     assert maps["sheet"][0].min() > alone["floor"][0].max()  # nearer to the lamp
+
+
+def test_a_dim_furnace_beside_one_a_million_times_brighter(tmp_path):
+    """No threshold of the scene drops its light or lets the other's in."""
+    beside = np.eye(4)
+    beside[0, 3] = 1.5
+    rooms = cube(1.0, E=1e6) | {f"dim {k}": (transformed(face, beside), f) for k, (face, f) in cube(1.0, E=1.0).items()}
+    for name, (H, _) in baked(tmp_path, rooms, 0.8).items():
+        E = 1.0 if name.startswith("dim") else 1e6
+        assert H * 0.2 / E == pytest.approx(np.ones(H.shape), rel=0.03)
+
+
+def test_a_ball_is_not_shaded_by_its_own_mesh(tmp_path):
+    """Where it sees the whole lamp at more than n.l = 0.1 the light of every sample is the form factor, within 5 %."""
+    lamp = [[-0.2, -0.2, 2], [0.2, -0.2, 2], [0.2, 0.2, 2], [-0.2, 0.2, 2]]
+    surfaces = {"ball": (sphere(0.5), {}), "lamp": (rectangle([-0.2, 0.2, 2], [0.4, 0, 0], [0, -0.4, 0]), {"E": 1.0})}
+    H = baked(tmp_path, surfaces, 0.5, bounces=1, base_direct=4)["ball"][0]
+    v, u = np.meshgrid(np.linspace(0, 1, H.shape[0]), np.linspace(0, 1, H.shape[1]), indexing="ij")
+    S, N = frame(sphere(0.5), u.ravel(), v.ravel())
+    to_lamp = np.asarray(lamp) - S[:, None]
+    sees_all = (np.einsum("kpc,kc->kp", to_lamp, N) / np.linalg.norm(to_lamp, axis=2) > 0.1).all(axis=1)
+    expected = form_factor_polygon(to_lamp, N)
+    assert sees_all.sum() > 50
+    assert H[..., 0, 0].ravel()[sees_all] == pytest.approx(expected[sees_all], rel=0.05)
 
 
 @pytest.mark.parametrize("axis", [0, 2])

@@ -106,6 +106,17 @@ def test_a_white_room_beside_a_large_dark_one(rho):
     assert np.abs(found.H - truth).sum() < 3e-3 * truth.sum()
 
 
+@pytest.mark.parametrize("ratio", [1e3, 1e6, 1e9])
+def test_a_dim_room_beside_a_bright_one(ratio):
+    """Errors are relative in each room: none of the bright light goes to the dim one, whose own is not dropped."""
+    entries = sampled_rows([100, 100])
+    rho = np.full((200, 3), 0.8)
+    H_direct = direct(200, 3) * np.repeat([ratio, 1], 100)[:, None, None]
+    truth = exact(H_direct, rho, dense(entries))
+    error = np.abs(solve(H_direct, rho, np.ones(200), FormFactors(entries)).H / truth - 1)
+    assert error[:100].mean() < 2e-3 and error[100:].mean() < 2e-3
+
+
 @pytest.mark.parametrize("seed", range(4))
 def test_the_account_of_the_power_adds_up(seed):
     """Received = absorbed + escaped + unshot to rounding, channel by channel, negative unshot light included."""
