@@ -197,6 +197,16 @@ def test_dim_lights_are_taken_as_unblocked_beside_bright_ones_alone():
     assert alone < beside < alone * (1 + DIM)
 
 
+def test_what_one_point_has_found_makes_no_light_dim_at_another():
+    """A lit point on the left of a wall; on its right a faint lamp above a screen: dark, asked together or alone."""
+    wall = {"wall": (rectangle([0, -2, -0.01], [0, 4, 0], [0, 0, 3]), {})}
+    low = {"low": (rectangle([0, -2, 0.5], [2, 0, 0], [0, 4, 0]), {})}
+    lamp = {"lamp": (rectangle([-1.5, 0.5, 1], [1, 0, 0], [0, -1, 0]), {"E": 1.0})}
+    faint = {"faint": (rectangle([0.5, 0.5, 1], [1, 0, 0], [0, -1, 0]), {"E": 0.1 * DIM})}
+    H, _ = light(FLOOR | wall | low | lamp | faint, [[-1.0, 0, 0], [1.0, 0, 0]])
+    assert H[0].min() > 0.1 and not H[1].any()
+
+
 def test_light_groups_are_kept_apart_and_add_up():
     x = points(60)
     left = rectangle([-1.5, 0.5, 1], [1, 0, 0], [0, -1, 0])
