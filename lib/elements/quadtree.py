@@ -69,12 +69,18 @@ class Quadtree:
         noisy = self.noise > 0
         if not noisy.any():
             return np.nonzero(np.zeros_like(noisy))
-        beside = grow(noisy, self.lattice.closed)
+        beside = self._beside(noisy)
         if min(noisy.shape) > 4:
-            beside[::2, ::2] |= grow(noisy[::2, ::2], self.lattice.closed)
+            beside[::2, ::2] |= self._beside(noisy[::2, ::2])
         doubt = beside & ~noisy & self.known & ~self.hidden & ~self._sure & self.lattice.is_own(self.level)
         self._sure |= doubt
         return np.nonzero(doubt)
+
+    def _beside(self, crossings):
+        """Crossings (h, w) bool and their eight neighbours; at a seam the last line is a copy of the first, left out."""
+        u, v = (int(c) for c in self.lattice.closed)
+        own = crossings[: len(crossings) - v, : crossings.shape[1] - u]
+        return np.pad(grow(own, self.lattice.closed), ((0, v), (0, u)), mode="wrap")
 
     def split(self, tau, top):
         """Divide leaves above the threshold tau, up to level `top`; balance.  Returns True when new samples are

@@ -160,6 +160,16 @@ def test_round_a_seam():
     assert is_balanced(tree.divided, lattice.closed)
 
 
+def test_samples_beside_noisy_ones_are_doubted_once_round_a_seam_too():
+    """Noise in the column before the seam: the columns on both its sides are asked again, the noisy one is not."""
+    for closed, expected in ((True, {0, 6}), (False, {6, 8})):
+        tree = Quadtree(Lattice((1, 1), (closed, False)), 3, 1)
+        j, i = tree.wanted()
+        tree.put((j, i), np.zeros((len(j), 1)), False, np.where(i == 7, 0.1, 0), np.inf)
+        assert set(tree.doubtful()[1].tolist()) == expected
+        assert not len(tree.doubtful()[1])
+
+
 def test_balance_goes_round_a_seam():
     """Fine cells on one side of the seam alone: the cells across it follow."""
     lattice = Lattice((4, 1), closed=(True, False))
