@@ -9,7 +9,7 @@ sys.path.insert(0, workflow.basedir)
 from lib.door import stopped
 from lib.formats import preflight
 from lib.formats.artefact import ArtefactError
-from lib.formats.rule_settings import n_chunks, rule_settings
+from lib.formats.rule_settings import n_chunks, rule_settings, short
 from lib.refusal import Refusal
 from lib.stage_code import stage_digests
 
@@ -41,7 +41,8 @@ envvars:  # goes with jobs to other machines
 PYTHON = sys.executable
 OUT = f"results/{scene.name}"
 STAGE = f"{OUT}/stages"
-SETTINGS = rule_settings(scene.settings, scene.warnings, scene.tolerances, scene.reconstruction)
+SLICES = rule_settings(scene.settings, scene.warnings, scene.tolerances, scene.reconstruction)
+SETTINGS = short(SLICES, f"{OUT}/settings")
 MAPPED = [f for f, role, black in zip(scene.files, scene.roles, scene.is_black) if role != "cast_only" and not black]
 N_CHUNKS = n_chunks(scene.settings, len(MAPPED))
 CHUNKS = range(N_CHUNKS)
@@ -271,7 +272,8 @@ rule lod_export:
         reconstruction=SETTINGS["reconstruction"],
     shell:
         "{PYTHON:q} -m stages.lod_export --scene {input.scene:q} --casters {input.casters:q} --levels {params.levels:q} --units m"
-        " --level-index {wildcards.k} {params.more:q} --reconstruction {params.reconstruction:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
+        " --level-index {wildcards.k} {params.more:q} --reconstruction {params.reconstruction:q} --out {output:q}"
+        " --log {log.text:q} --cost {log.cost:q}"
 
 
 rule package:

@@ -85,6 +85,16 @@ def warn(text):
         log.add(line)
 
 
+def json_text(text):
+    """The value of an argument that is JSON, or @FILE that holds it: a command line holds 128 kB."""
+    if not text.startswith("@"):
+        return json.loads(text)
+    try:
+        return read_json(text[1:])
+    except ArtefactError as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
 def run(doc, arguments, body, argv=None):
     """Run a stage; return its exit status: 0, or 1 after one plain line that says why."""
     parser = argparse.ArgumentParser(description=doc, formatter_class=argparse.RawDescriptionHelpFormatter)

@@ -10,7 +10,6 @@ writes  textured maps of all surfaces                                         (l
 """
 
 import hashlib
-import json
 from pathlib import Path
 
 import numpy as np
@@ -30,7 +29,7 @@ def arguments(parser):
     parser.add_argument("--maps", required=True, nargs="+", metavar="FILE", help="light maps of every chunk")
     parser.add_argument("--materials", required=True, metavar="FILE", help="JSON: rho_avg of every surface")
     parser.add_argument("--textures", required=True, metavar="FILE", help="JSON: base textures")
-    parser.add_argument("--settings", type=json.loads, default={}, metavar="JSON", help="texture_level, intensity")
+    parser.add_argument("--settings", type=door.json_text, default={}, metavar="JSON", help="texture_level, intensity")
     parser.add_argument("--maps-folder", required=True, metavar="FOLDER", help="where the EXR maps go")
     parser.add_argument("--out", required=True, metavar="FILE", help="textured maps of all surfaces")
 

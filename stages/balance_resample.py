@@ -7,7 +7,6 @@ reads   scene.npz, solution.npz, direct_<c>.npz, indirect_<c>.npz               
 settings: tolerance, tolerances, relative_to, t_direct, t_indirect
 """
 
-import json
 
 import numpy as np
 
@@ -24,7 +23,7 @@ def arguments(parser):
     """Name the stage's files and settings."""
     for name in ("scene", "solution", "direct", "indirect", "out"):
         parser.add_argument(f"--{name}", required=True, metavar="FILE")
-    parser.add_argument("--settings", type=json.loads, required=True, metavar="JSON")
+    parser.add_argument("--settings", type=door.json_text, required=True, metavar="JSON")
 
 
 def body(args, cost):

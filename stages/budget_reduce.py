@@ -11,7 +11,6 @@ smallest D_i for the bytes it frees.
 """
 
 import dataclasses
-import json
 
 from lib import door
 from lib.formats import casters, textured_maps
@@ -25,7 +24,7 @@ PROFILES = {"standard": "final", "lightmap": "light"}
 def arguments(parser):
     parser.add_argument("--maps", required=True, nargs="+", metavar="FILE", help="textured maps of every chunk")
     parser.add_argument("--casters", required=True, metavar="FILE", help="casters.npz")
-    parser.add_argument("--settings", required=True, type=json.loads, metavar="JSON", help="budget [bytes], profile")
+    parser.add_argument("--settings", required=True, type=door.json_text, metavar="JSON", help="budget and profile")
     parser.add_argument("--out", required=True, metavar="FILE", help="textures.npz")
     parser.add_argument("--table", required=True, metavar="FILE", help="budget.json")
 

@@ -28,10 +28,10 @@ def arguments(parser):
     parser.add_argument("--scene", required=True, metavar="FILE", help="scene.npz")
     parser.add_argument("--casters", required=True, metavar="FILE", help="casters.npz")
     parser.add_argument("--textures", metavar="FILE", help="textures.npz, for light in vertices")
-    parser.add_argument("--levels", required=True, type=json.loads, metavar="JSON", help="all levels, finest first")
+    parser.add_argument("--levels", required=True, type=door.json_text, metavar="JSON", help="all levels, finest first")
     parser.add_argument("--level-index", required=True, type=int, metavar="K", help="which of them to cut, from 0")
     parser.add_argument("--units", default="m", choices=sorted(METRES), help="of lengths without a unit (default m)")
-    parser.add_argument("--reconstruction", type=json.loads, default={}, metavar="JSON", help="{surface: way}")
+    parser.add_argument("--reconstruction", type=door.json_text, default={}, metavar="JSON", help="{surface: way}")
     parser.add_argument("--out", required=True, metavar="FILE", help="lod_<k>.npz")
 
 
@@ -43,7 +43,8 @@ def body(args, cost):
     surfaces = tessellate.into_frame(x.surfaces, shapes.centre, shapes.scale)
     k, asked = args.level_index, levels[args.level_index]
     try:
-        level = cut(Scene(surfaces, shapes, lattice(x.names, args.textures, args.reconstruction)), levels, k, args.units, shapes.scale)
+        pieces = Scene(surfaces, shapes, lattice(x.names, args.textures, args.reconstruction))
+        level = cut(pieces, levels, k, args.units, shapes.scale)
     except TooFine as error:
         raise refusal(f"{json.dumps(asked)} {error}", field=f"lods[{k}]") from None
     note = ""

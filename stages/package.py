@@ -12,7 +12,6 @@ Reconstruction `gouraud` puts a map's light into the vertices, and so does `auto
 have vertices on the lines of the map's lattice.
 """
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +30,7 @@ def arguments(parser):
     parser.add_argument("--textures", required=True, metavar="FILE", help="textures.npz")
     parser.add_argument("--materials", required=True, metavar="FILE", help="JSON: rho_avg of every surface")
     parser.add_argument("--lods", required=True, nargs="+", metavar="FILE", help="lod_<k>.npz, finest first")
-    parser.add_argument("--settings", type=json.loads, default={}, metavar="JSON", help="exposure")
+    parser.add_argument("--settings", type=door.json_text, default={}, metavar="JSON", help="exposure")
     parser.add_argument("--results", required=True, metavar="FOLDER", help="where the files go")
 
 

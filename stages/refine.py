@@ -4,10 +4,10 @@ all direct trees.
 reads   scene.npz, casters.npz, solution.npz, and chunk_<c>.npz of sample (direct) or all direct_<c>.npz (indirect)
 writes  direct_<c>.npz or indirect_<c>.npz          (lib.formats.trees)
 
-settings: seed, tolerance, tolerances, relative_to, t_direct, t_indirect, base_indirect, top, gather_rays, shadow_rays, bounces
+settings: seed, tolerance, tolerances, relative_to, t_direct, t_indirect, base_indirect, top, gather_rays, shadow_rays,
+bounces
 """
 
-import json
 
 import numpy as np
 
@@ -28,7 +28,7 @@ def arguments(parser):
     parser.add_argument("--direct", nargs="*", default=[], metavar="FILE", help="all direct trees (indirect half)")
     parser.add_argument("--chunk", type=int, required=True)
     parser.add_argument("--chunks", type=int, required=True)
-    parser.add_argument("--settings", type=json.loads, required=True, metavar="JSON")
+    parser.add_argument("--settings", type=door.json_text, required=True, metavar="JSON")
 
 
 def body(args, cost):

@@ -11,7 +11,6 @@ and lods.json are needed, and any other that is missing leaves its section out. 
 whose run is the environment's BAKE_RUN. The rays of the pictures are not rays of the bake.
 """
 
-import json
 import os
 from pathlib import Path
 
@@ -26,7 +25,7 @@ def arguments(parser):
     for name, (pattern, is_list, _) in bake_files.GIVEN.items():
         parser.add_argument(f"--{name}", metavar="FILE", nargs="*" if is_list else None, help=f"default: {pattern}")
     parser.add_argument("--name", help="of the scene (default: the name of the folder that holds lods.json)")
-    parser.add_argument("--settings", type=json.loads, default={}, metavar="JSON")
+    parser.add_argument("--settings", type=door.json_text, default={}, metavar="JSON")
     parser.add_argument("--out-html", metavar="FILE", help="default: report.html beside lods.json")
     parser.add_argument("--out-json", metavar="FILE", help="default: report.json beside lods.json")
 

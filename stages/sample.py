@@ -6,7 +6,6 @@ writes  chunk_<c>.npz                           (lib.formats.samples)
 settings: seed, n_elements, rays_per_element, first_shadow_rays [n0, n1], base_direct, bounces
 """
 
-import json
 
 import numpy as np
 
@@ -22,7 +21,7 @@ def arguments(parser):
         parser.add_argument(f"--{name}", required=True, metavar="FILE")
     parser.add_argument("--chunk", type=int, required=True)
     parser.add_argument("--chunks", type=int, required=True)
-    parser.add_argument("--settings", type=json.loads, required=True, metavar="JSON")
+    parser.add_argument("--settings", type=door.json_text, required=True, metavar="JSON")
 
 
 def body(args, cost):

@@ -7,7 +7,6 @@ writes  solution.npz                                                            
 settings: n_elements, convergence, bounces ("converge" or n)
 """
 
-import json
 
 import numpy as np
 
@@ -23,7 +22,7 @@ def arguments(parser):
     for name in ("scene", "casters", "materials", "out"):
         parser.add_argument(f"--{name}", required=True, metavar="FILE")
     parser.add_argument("--samples", nargs="+", required=True, metavar="FILE")
-    parser.add_argument("--settings", type=json.loads, required=True, metavar="JSON")
+    parser.add_argument("--settings", type=door.json_text, required=True, metavar="JSON")
 
 
 def body(args, cost):

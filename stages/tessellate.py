@@ -9,7 +9,6 @@ A surface is also kept within 2/1000 of its own size, so that small objects stay
 this mesh.
 """
 
-import json
 
 import numpy as np
 
@@ -23,7 +22,7 @@ SAG, OWN_SAG = 1e-3, 2e-3  # of the frame; of the surface's own size
 
 def arguments(parser):
     parser.add_argument("--scene", required=True, metavar="FILE", help="scene.npz")
-    parser.add_argument("--settings", type=json.loads, default={}, metavar="JSON", help="sag")
+    parser.add_argument("--settings", type=door.json_text, default={}, metavar="JSON", help="sag")
     parser.add_argument("--out", required=True, metavar="FILE", help="casters.npz")
 
 

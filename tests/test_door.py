@@ -1,6 +1,7 @@
 """The frame of the stages: exit status, log, cost record, and what the terminal is told."""
 
 import json
+from argparse import ArgumentTypeError
 
 import pytest
 
@@ -90,6 +91,13 @@ def test_warnings_outside_a_stage_go_to_the_terminal(tmp_path, capsys):
     door.warn("late")
     assert capsys.readouterr().err == "warning: late\n"
     assert "late" not in (tmp_path / "log.txt").read_text()
+
+
+def test_json_as_it_stands_or_from_a_file(tmp_path):
+    (tmp_path / "a.json").write_text('{"x": [1, 2]}')
+    assert door.json_text('{"x": [1, 2]}') == door.json_text(f"@{tmp_path}/a.json") == {"x": [1, 2]}
+    with pytest.raises(ArgumentTypeError, match="b.json: missing"):
+        door.json_text(f"@{tmp_path}/b.json")
 
 
 def test_damaged_records_stop_nobody(tmp_path):

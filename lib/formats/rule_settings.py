@@ -1,15 +1,19 @@
 """The slice of a scene's settings that each stage reads, and no more: what is not in it can not re-run the stage."""
 
+import hashlib
 import json
 import re
+from pathlib import Path
 
+from lib.formats.artefact import atomic
 from lib.radiosity.quality import quality
 
 RAYS_A_JOB = 12e6  # about 4 s of one core
 MOST_CHUNKS = 64
 SHADOW_RAYS = 24  # a sample, of a few lights in view
 GATHER_RAYS = 0.2  # of a sample, an element of the coarse solution: roughly what a tolerance asks for with as many
-MOST_WARNINGS = 100  # told the report: they are part of a command line
+MOST_WARNINGS = 100  # told the report
+LONGEST = 8000  # characters of a slice in a command line, which holds 128 kB in all
 
 
 def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None):
@@ -50,6 +54,19 @@ def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None):
         },
     }
     return {stage: _text(content) for stage, content in slices.items()}
+
+
+def short(slices, folder):
+    """The slices for command lines: long ones, of thousands of surfaces, as @FILE in `folder`, named by its content."""
+    return {stage: text if len(text) <= LONGEST else _file(stage, text, Path(folder)) for stage, text in slices.items()}
+
+
+def _file(stage, text, folder):
+    path = folder / f"{stage}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.json"
+    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        with atomic(path) as file:
+            file.write(text.encode())
+    return f"@{path.as_posix()}"
 
 
 def _first(warnings):

@@ -278,5 +278,5 @@ def collect(name, bake, settings, run):
         "seams_exported": exported_seams(bake, exported_maps, mean_H),
         "exposure": bake.lods.get("exposure"),
         "settings": settings.get("settings"),
-        "warnings": [*scene.warnings, *settings.get("warnings", [])],
+        "warnings": list(dict.fromkeys([*scene.warnings, *settings.get("warnings", [])])),
     }

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from lib import door
 from lib.formats import settings as scene_settings
 from lib.formats import strict_yaml
-from lib.formats.rule_settings import MOST_CHUNKS, n_chunks, rule_settings
+from lib.formats.rule_settings import MOST_CHUNKS, n_chunks, rule_settings, short
 
 DEFAULTS = Path(__file__).parents[2] / "config" / "bake.yaml"
 QUALITY = {"sample", "shoot", "refine", "balance_resample"}
@@ -75,6 +76,24 @@ def test_thousands_of_warnings_fit_a_command_line():
     warnings = [f"surface number {k}: its corners coincide with those of another" for k in range(5000)]
     text = rule_settings(settings(), warnings)["report"]
     assert len(text) < 50_000 and json.loads(text)["warnings"][-1].startswith("and 4900 more")
+
+
+def test_long_slices_go_by_file(tmp_path):
+    names = [f"teapot number {k} {{c}}/{p:02d}" for k in range(200) for p in range(32)]
+    long = rule_settings(settings(), (), {name: 0.1 for name in names}, {name: "gouraud" for name in names})
+    found = short(long, tmp_path / "settings")
+    assert found["sample"] == long["sample"]  # nothing of a surface
+    for stage in ("refine", "balance_resample", "reconstruction", "package", "report"):
+        assert found[stage].startswith(f"@{tmp_path}/settings/{stage}-") and len(found[stage]) < 300
+        assert door.json_text(found[stage]) == json.loads(long[stage])
+    assert sum(map(len, found.values())) < 10_000
+    path = Path(found["refine"][1:])
+    before = path.stat().st_mtime_ns
+    assert short(long, tmp_path / "settings") == found and path.stat().st_mtime_ns == before
+    path.write_text("{")
+    assert short(long, tmp_path / "settings") == found and path.read_text() == long["refine"]
+    moved = short(rule_settings(settings(), (), {name: 0.2 for name in names}), tmp_path / "settings")
+    assert moved["refine"] != found["refine"]
 
 
 def test_chunks_follow_the_scene_and_not_the_tolerance():
