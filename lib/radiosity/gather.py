@@ -16,7 +16,7 @@ import numpy as np
 
 from lib.elements.grids import at_centres
 from lib.elements.lattice import OFFSET
-from lib.visibility.hemisphere import cosine_directions
+from lib.visibility.hemisphere import cosine_direction_each, cosine_directions
 from lib.visibility.hidden import is_hidden
 from lib.visibility.qmc import fibonacci, weyl
 
@@ -78,8 +78,8 @@ class LookupTable:
         surface = np.append(mesh.face_surface, n_surfaces)
         width, height = np.append(width, 2), np.append(height, 2)
         self._offset, self._width = offset[surface].astype(np.int64), width[surface].astype(np.int64)
-        self._last_i = (width[surface] - 2).astype(np.float32)
-        self._last_j = (height[surface] - 2).astype(np.float32)
+        last = np.stack([width[surface] - 2, height[surface] - 2], axis=1).astype(np.float32)
+        self._faces = np.concatenate([self._faces, last], axis=1)
         self._rho, self._near = rho[surface], near[surface]
 
     def all_light(self, hits):
@@ -99,21 +99,37 @@ class LookupTable:
         return ~hits.is_back & (hits.t < self._near[hits.face]) & (hits.face >= 0)
 
     def _look_up(self, texels, hits):
+        # np.take and work in place: half the time of plain indexing, and this is where the time goes.
         face = np.where(hits.is_back | (hits.face < 0), len(self._offset) - 1, hits.face)
-        place = self._faces[face]
+        place = np.take(self._faces, face, axis=0)
         s = place[:, 0] + hits.a * place[:, 2] + hits.b * place[:, 4]
         t = place[:, 1] + hits.a * place[:, 3] + hits.b * place[:, 5]
-        i = np.minimum(np.maximum(np.floor(s), 0), self._last_i[face])
-        j = np.minimum(np.maximum(np.floor(t), 0), self._last_j[face])
-        fs, ft = (s - i)[:, None], (t - j)[:, None]
-        width = self._width[face]
-        corner = self._offset[face] + j.astype(np.int64) * width + i.astype(np.int64)
-        low = texels[corner] * (1 - fs) + texels[corner + 1] * fs
+        i = np.minimum(np.maximum(np.floor(s), 0), place[:, 6])
+        j = np.minimum(np.maximum(np.floor(t), 0), place[:, 7])
+        s -= i
+        t -= j
+        width = np.take(self._width, face)
+        corner = j.astype(np.int64)
+        corner *= width
+        corner += i.astype(np.int64)
+        corner += np.take(self._offset, face)
+        low = self._along(texels, corner, s[:, None])
         corner += width
-        high = texels[corner] * (1 - fs) + texels[corner + 1] * fs
-        texel = low * (1 - ft) + high * ft
+        texel = self._along(texels, corner, s[:, None])
+        texel -= low
+        texel *= t[:, None]
+        texel += low
         weight = texel[:, -1:]
-        return texel[:, :-1] / np.where(weight > 0, weight, 1.0)
+        return texel[:, :-1] / np.where(weight > 0, weight, np.float32(1))
+
+    @staticmethod
+    def _along(texels, corner, f):
+        first = np.take(texels, corner, axis=0)
+        second = np.take(texels, corner + 1, axis=0)
+        second -= first
+        second *= f
+        second += first
+        return second
 
 
 def _weighted(value, weight):
@@ -163,7 +179,7 @@ def _follow(origins, D, hits, random, tracer, mesh, table, steps):
         there = hits[near]
         N = mesh.normal[there.face]
         x = (origins[near] + there.t[:, None] * D[near] + N * OFFSET).astype(np.float32)
-        onward = cosine_directions(N, np.zeros((1, 2)), random[near])[:, 0]
+        onward = cosine_direction_each(N, random[near])
         beyond = tracer.closest(x, onward)
         turned = (random[near] + 0.6180339887) % 1.0
         H = _follow(x, onward, beyond, turned, tracer, mesh, table, steps - 1)

@@ -45,3 +45,19 @@ def cosine_directions(N, points, shift):
     np.multiply(r, np.sin(phi).astype(np.float32), out=local[..., 1])
     np.sqrt(np.maximum(1 - a, 1e-12), out=local[..., 2])  # never exactly along the plane
     return local @ frames
+
+
+def cosine_direction_each(N, points):
+    """One direction of density cos / pi for each normal: N (m, 3), points (m, 2) of [0, 1)^2; (m, 3) float32."""
+    N, points = N.astype(np.float32), points.astype(np.float32)
+    x, y, z = N.T
+    r, phi = np.sqrt(points[:, 0]), np.float32(2 * np.pi) * points[:, 1]
+    t, u, n = r * np.cos(phi), r * np.sin(phi), np.sqrt(np.maximum(1 - points[:, 0], np.float32(1e-12)))
+    sign = np.where(z < 0, np.float32(-1), np.float32(1))
+    a = -1 / (sign + z)
+    b = x * y * a
+    D = np.empty((len(N), 3), dtype=np.float32)
+    D[:, 0] = t * (1 + sign * x * x * a) + u * b + n * x
+    D[:, 1] = t * sign * b + u * (sign + y * y * a) + n * y
+    D[:, 2] = -t * sign * x - u * y + n * z
+    return D

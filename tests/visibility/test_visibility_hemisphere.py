@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lib.visibility import qmc
-from lib.visibility.hemisphere import cosine_directions, tangent_frames
+from lib.visibility.hemisphere import cosine_direction_each, cosine_directions, tangent_frames
 from lib.visibility.hidden import is_hidden
 from lib.visibility.qmc import R2_STEP, r2, shift, stream
 from tests.tolerances import EXACT, FLOAT32, STANDARD_ERRORS
@@ -142,3 +142,13 @@ def test_hidden_by_shells_at_a_tenth_and_by_sheets_at_nine_tenths(back, shell, e
 
 def test_front_faces_of_shells_hide_nothing():
     assert not is_hidden(BACK, ~BACK).any()
+
+
+def test_one_direction_each_is_the_first_of_many():
+    """The direct formula against the general one, for normals all round, the poles of the frame among them."""
+    rng = np.random.default_rng(5)
+    N = np.concatenate([rng.normal(size=(500, 3)), [[0, 0, 1.0], [0, 0, -1.0], [1.0, 0, 0]]])
+    N /= np.linalg.norm(N, axis=1)[:, None]
+    points = rng.random((len(N), 2))
+    many = cosine_directions(N, np.zeros((1, 2)), points)[:, 0]
+    assert np.abs(cosine_direction_each(N, points) - many).max() < 4 * FLOAT32
