@@ -80,6 +80,12 @@ def test_size():
     assert shape.size(sphere(3.0)) == pytest.approx(6, rel=EXACT)
 
 
+def petal():
+    """A loop of curves that leave a point and come back to it: its two poles are one point, and no seam."""
+    P = [[[0, 0, 0], [0, 0, 0]], [[1, 0, 1], [1, 1, 1]], [[1, 0, -1], [1, 1, -1]], [[0, 0, 0], [0, 0, 0]]]
+    return from_points(3, 1, [0] * 4 + [1] * 4, [0, 0, 1, 1], np.array(P, dtype=float))
+
+
 CLOSED = {
     "sphere": (sphere(), (True, False), [False, False, True, True]),
     "torus": (torus(), (True, True), [False] * 4),
@@ -88,6 +94,7 @@ CLOSED = {
     "disc": (disc(), (True, False), [False, False, True, False]),
     "triangle": (triangle([0, 0, 0], [1, 0, 0], [0, 1, 0]), (False, False), [False, False, False, True]),
     "rectangle": (rectangle([0, 0, 0], [1, 0, 0], [0, 1, 0]), (False, False), [False] * 4),
+    "petal": (petal(), (False, False), [True, True, False, False]),
 }
 
 
