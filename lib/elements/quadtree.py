@@ -77,7 +77,7 @@ class Quadtree:
         return np.nonzero(doubt)
 
     def _beside(self, crossings):
-        """Crossings (h, w) bool and their eight neighbours; at a seam the last line is a copy of the first, left out."""
+        """Crossings (h, w) bool and their eight neighbours; a seam's last line, a copy of the first, is left out."""
         u, v = (int(c) for c in self.lattice.closed)
         own = crossings[: len(crossings) - v, : crossings.shape[1] - u]
         return np.pad(grow(own, self.lattice.closed), ((0, v), (0, u)), mode="wrap")
