@@ -7,7 +7,6 @@ reads   scene.npz, solution.npz, direct_<c>.npz, indirect_<c>.npz               
 settings: tolerance, tolerances, relative_to, t_direct, t_indirect
 """
 
-
 import numpy as np
 
 from lib import door

@@ -8,7 +8,6 @@ settings: seed, tolerance, tolerances, relative_to, t_direct, t_indirect, base_i
 bounces
 """
 
-
 import numpy as np
 
 from lib import door

@@ -6,7 +6,6 @@ writes  chunk_<c>.npz                           (lib.formats.samples)
 settings: seed, n_elements, rays_per_element, first_shadow_rays [n0, n1], base_direct, bounces
 """
 
-
 import numpy as np
 
 from lib import door

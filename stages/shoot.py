@@ -7,7 +7,6 @@ writes  solution.npz                                                            
 settings: n_elements, convergence, bounces ("converge" or n)
 """
 
-
 import numpy as np
 
 from lib import door

@@ -9,7 +9,6 @@ A surface is also kept within 2/1000 of its own size, so that small objects stay
 this mesh.
 """
 
-
 import numpy as np
 
 from lib import door

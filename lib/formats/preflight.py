@@ -24,8 +24,8 @@ from lib.refusal import Refusal, refusal
 VERSION = 2
 ROOT = Path(__file__).resolve().parents[2]
 _FIELDS = (
-    "settings", "names", "files", "roles", "is_black", "area", "groups", "tolerances", "reconstruction", "textures", "rho_avg",
-    "geometry_files", "texture_files", "slices", "warnings",
+    "settings", "names", "files", "roles", "is_black", "area", "groups", "tolerances", "reconstruction", "textures",
+    "rho_avg", "geometry_files", "texture_files", "slices", "warnings",
 )  # fmt: skip
 
 

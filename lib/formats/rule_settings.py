@@ -40,7 +40,11 @@ def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None):
         "refine": light | threshold | refine,
         "balance_resample": threshold,
         "apply_base_texture": {"texture_level": bake["texture_level"]},
-        "budget_reduce": {"budget": settings["budget"], "profile": settings["export"]["profiles"][0]},
+        "budget_reduce": {
+            "budget": settings["budget"],
+            "profile": settings["export"]["profiles"][0],
+            "order": settings["export"].get("budget_order", "loss"),
+        },
         "lod_export": settings["lods"],
         "reconstruction": reconstruction or {},
         "package": {"exposure": settings["export"]["exposure"], "reconstruction": reconstruction or {}},

@@ -103,8 +103,8 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
 def rays_for(cell, contrast, K):
     """Gather rays of samples: K for cells of LARGE_CELL where the light around varies by USUAL_CONTRAST.
 
-    cell, contrast, K (n,).  With variance ~ contrast^2 rays^-1.6, the sum of area x variance is least for a given number
-    of rays when rays ~ (area contrast^2)^(1/2.6).  Rounded to sizes that share a batch.
+    cell, contrast, K (n,).  With variance ~ contrast^2 rays^-1.6, the sum of area x variance is least for a given
+    number of rays when rays ~ (area contrast^2)^(1/2.6).  Rounded to sizes that share a batch.
     """
     need = K * np.minimum(1.0, cell / LARGE_CELL) ** (2 / 2.6) * (contrast / USUAL_CONTRAST) ** (2 / 2.6)
     need = np.clip(need, np.maximum(LEAST_RAYS, K / 8), 4 * K)

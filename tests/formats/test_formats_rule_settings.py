@@ -33,6 +33,7 @@ def settings(**changed):
         ({"lods": [{"deviation": "1 mm"}]}, {"lod_export"}),
         ({"budget": "2 MiB"}, {"budget_reduce"}),
         ({"export__exposure": 2}, {"package"}),
+        ({"export__budget_order": "loss_per_byte"}, {"budget_reduce"}),
         ({"camera": {"eye": [0, 0, 1], "target": [1, 1, 1]}}, set()),
         ({"up": "y"}, set()),  # of the geometry, which has its own slice
         ({"bake__chunks": 3}, set()),  # a param of its own

@@ -126,7 +126,7 @@ def by_name(files, ways):
 
 
 def reconstruct(files, ways, level=2):
-    """Store the maps again, cut the levels with the maps known; ways: {surface index: reconstruction}, else "texture"."""
+    """Store the maps again, cut the levels with them known; ways: {surface index: reconstruction}, else "texture"."""
     chosen = by_name(files, ways)
     maps = textured_maps.load(files / "textures.npz")
     if level == 0:
