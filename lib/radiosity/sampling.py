@@ -6,7 +6,6 @@ import numpy as np
 
 from lib.elements.grids import by_element, point_parameters
 from lib.elements.lattice import OFFSET, receivers
-from lib.maps.fill import one_deep
 from lib.nurbs.evaluate import evaluate_grid, frame_grid
 from lib.radiosity.direct import direct_light
 from lib.radiosity.rows import Rows, element_rows
@@ -120,15 +119,18 @@ def surface_elements(world, s, seed, grids, R, base):
     visible = ~rows.is_hidden
     area = (density * visible).mean(axis=1) / (n_u * n_v)
     value, hidden = base[:2]
-    light = by_element(_bilinear(one_deep(value, hidden, world.lattices[s].closed), u, v))
+    light = by_element(_bilinear(value, hidden, u, v))
     count = np.maximum(visible.sum(axis=1), 1)[:, None]
     return Elements(rows, area, (light * visible[..., None]).sum(axis=1) / count)
 
 
-def _bilinear(value, u, v):
-    """Lattice values (h, w, C) on the tensor grid u, v: (len v, len u, C)."""
+def _bilinear(value, hidden, u, v):
+    """Lattice values (h, w, C) on the tensor grid u, v, by their visible corners alone: (len v, len u, C)."""
     h, w = value.shape[:2]
+    seen = ~hidden[..., None]
+    value = np.concatenate([value * seen, seen], axis=2)
     i, j = np.minimum((u * (w - 1)).astype(int), w - 2), np.minimum((v * (h - 1)).astype(int), h - 2)
     fu, fv = (u * (w - 1) - i)[None, :, None], (v * (h - 1) - j)[:, None, None]
     rows = value[j] * (1 - fv) + value[j + 1] * fv
-    return rows[:, i] * (1 - fu) + rows[:, i + 1] * fu
+    light = rows[:, i] * (1 - fu) + rows[:, i + 1] * fu
+    return light[..., :-1] / np.where(light[..., -1:] > 0, light[..., -1:], 1.0)
