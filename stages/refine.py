@@ -13,8 +13,8 @@ import numpy as np
 from lib import door
 from lib.formats import casters, samples, scene, solution, trees
 from lib.radiosity.quality import gather_rays
-from lib.radiosity.refine import error_of, lookup_table, refine_direct, refine_indirect
-from lib.radiosity.thresholds import own_share, thresholds
+from lib.radiosity.refine import error_of, lookup_table, rays_of_surfaces, refine_direct, refine_indirect
+from lib.radiosity.thresholds import own_light, own_share, thresholds
 from lib.radiosity.world import World
 
 
@@ -49,7 +49,7 @@ def body(args, cost):
         mine = world.chunk(args.chunks, args.chunk)
         follows = chosen["bounces"] == "converge"
         table = lookup_table(world, direct, solved, follows)
-        rays = gather_rays(chosen["gather_rays"], own)
+        rays = rays_of_surfaces(gather_rays(chosen["gather_rays"], own), own_light(solved, chosen))
         top, base = chosen["top"], chosen["base_indirect"]
         done = refine_indirect(world, mine, table, solved, chosen["seed"], tau, top, base, rays)
     trees.save(args.out, args.half, {int(s): stored(t, world.n_groups) for s, t in done.items()}, cost.notes)

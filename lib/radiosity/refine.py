@@ -111,6 +111,14 @@ def rays_for(cell, contrast, K):
     return (16 * np.round(2 ** (np.round(2 * np.log2(need)) / 2) / 16)).astype(np.int64)
 
 
+def rays_of_surfaces(K, own_light):
+    """Gather rays of surfaces whose errors count beside their own light, `own_light` (n,) of the scene's: (n,).
+
+    contrast_at takes the geometric mean of both, so half of the ratio is left for here.
+    """
+    return K * own_light ** (-0.5 * 2 / 2.6)
+
+
 def contrast_at(points, solution):
     """How much the light around varies over directions, by the element each point lies in: (n,).
 

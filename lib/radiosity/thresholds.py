@@ -19,10 +19,16 @@ def thresholds(solution, own, half, settings):
     A mean of 0 (no light) gives a threshold that nothing exceeds.
     """
     t = settings["t_direct"] if half == "direct" else settings["t_indirect"]
-    mean = float(np.max(solution.mean_H))
-    means = np.full(len(own), mean)
-    if settings["relative_to"] == "surface":
-        local = solution.H_surface.max(axis=1)
-        means = np.where(local > 0, local, mean)
-    tau = t * own * means
+    tau = t * own * own_light(solution, settings) * float(np.max(solution.mean_H))
     return {s: (value if value > 0 else np.inf) for s, value in enumerate(tau)}
+
+
+def own_light(solution, settings):
+    """(n,) mean irradiance that the tolerance of each surface is relative to, over the scene's: 1 but where
+    relative_to is "surface" and the surface has light."""
+    share = np.ones(len(solution.H_surface))
+    if settings["relative_to"] == "surface":
+        local, mean = solution.H_surface.max(axis=1), float(np.max(solution.mean_H))
+        lit = (local > 0) & (mean > 0)
+        share[lit] = local[lit] / mean
+    return share
