@@ -27,6 +27,7 @@ STANDARD = {  # the defaults of config/bake.yaml
     "gather_rays": "auto",
     "shadow_rays": "auto",
 }
+DENSE = 193  # points a side at which maps are compared, between their texels too
 INSIDE = 0.002  # border samples look from this far inside, in parameters
 
 
@@ -92,6 +93,16 @@ def crossings(shape, origin, u, v):
     """Points (h, w, 3) of a rectangle that the samples of its map (h, w, ...) look from."""
     b, a = (np.clip(np.linspace(0, 1, n), INSIDE, 1 - INSIDE) for n in shape[:2])
     return np.asarray(origin) + a[None, :, None] * np.asarray(u, float) + b[:, None, None] * np.asarray(v, float)
+
+
+def looked_up(H, shape):
+    """A map (h, w, ...) looked up bilinearly at shape = (rows, columns) of uniform parameters, borders included."""
+    for axis in (0, 1):
+        x = np.linspace(0, H.shape[axis] - 1, shape[axis])
+        i = np.minimum(x.astype(int), H.shape[axis] - 2)
+        t = (x - i).reshape([-1 if k == axis else 1 for k in range(H.ndim)])
+        H = np.take(H, i, axis=axis) * (1 - t) + np.take(H, i + 1, axis=axis) * t
+    return H
 
 
 def worst(value, truth):
