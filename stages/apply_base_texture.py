@@ -156,7 +156,7 @@ def write_map(path, B, hidden, name, surface, rho_avg):
     """Write the illumination map of one surface."""
     pictures.write_exr(
         path,
-        one_deep(B, hidden, is_closed(surface)),
+        one_deep(B, hidden, is_closed(surface), collapsed_sides(surface)),
         {
             "surface": name,
             "unit": "W/m^2",

@@ -10,10 +10,14 @@ import numpy as np
 NEIGHBOURS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
 
 
-def one_deep(value, hidden, closed=(False, False)):
+SIDES = (np.s_[:, 0], np.s_[:, -1], np.s_[0], np.s_[-1])  # u = 0, u = 1, v = 0, v = 1
+
+
+def one_deep(value, hidden, closed=(False, False), collapsed=(False,) * 4):
     """Return a copy of value whose hidden texels hold the mean of their visible neighbours (of 8), or 0 without one.
 
     closed : (u, v); along a closed direction the last column or row is a copy of the first and neighbours go round.
+    collapsed : of the SIDES, those that are one point: filled, all their texels hold one mean.
     """
     filled = np.where(_like(hidden, value), 0, value)
     if not hidden.any():
@@ -27,6 +31,9 @@ def one_deep(value, hidden, closed=(False, False)):
         count += seen[1 + dj : 1 + dj + h, 1 + di : 1 + di + w]
     edge = hidden & (count > 0)
     filled[edge] = (total[edge] / _like(count[edge], total[edge])).astype(value.dtype)
+    for side, line in enumerate(SIDES):
+        if collapsed[side] and edge[line].any():
+            filled[line] = filled[line][edge[line]].mean(axis=0)
     return filled
 
 

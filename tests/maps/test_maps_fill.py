@@ -28,6 +28,14 @@ def test_one_deep_goes_round_a_closed_direction():
     assert one_deep(value, hidden, (True, False))[0, :, 0].tolist() == [4, 4, 4, 0, 0, 4]
 
 
+def test_a_buried_pole_is_filled_with_one_value():
+    value, hidden = drawn("1 3 5 / . . . / . . .")
+    below, above = (False, False, False, True), (False, False, True, False)
+    assert one_deep(value, hidden, collapsed=below)[1:, :, 0].tolist() == [[2, 3, 4], [0, 0, 0]]
+    assert one_deep(value[:2], hidden[:2], collapsed=below)[1, :, 0].tolist() == [3, 3, 3]
+    assert one_deep(value[:2], hidden[:2], collapsed=above)[:, :, 0].tolist() == [[1, 3, 5], [2, 3, 4]]
+
+
 def test_push_pull_keeps_visible_bits_and_fills_within_their_range():
     rng = np.random.default_rng(3)
     value = rng.random((33, 17, 3)).astype(np.float32)
