@@ -26,8 +26,10 @@ def test_one_core_one_chunk_and_a_second_run_beside_it(baked, fresh):
     """A run that finds another in its folder refuses, and does that one no harm."""
     with fresh.started(FINAL, cores=1, config=["bake={chunks: 1}"]) as first:
         wait_for(first, "results/*/stages/import_scene/scene.npz", folder=fresh.work)
+        first.send_signal(signal.SIGSTOP)  # so that it is there for as long as the second one looks
         assert first.poll() is None
         second = fresh.run(FINAL, "--rerun-incomplete", config=["bake={chunks: 1}"])
+        first.send_signal(signal.SIGCONT)
         assert second.returncode != 0 and "cannot be locked" in second.stderr
         assert "Traceback" not in second.stderr
         assert first.wait() == 0

@@ -41,8 +41,10 @@ def test_nothing_changed_nothing_to_do(baked):
         ("max_level: 5", "max_level: 5, seed: 2", stages_from("sample")),
         ("origin: [0, 3, 0]", "origin: [0, 3.1, 0]", set(STAGES)),
         ("eye: [2, -4, 2]", "eye: [2, -4, 1]", {"report"}),
+        ("camera:", "surfaces: {dome: {tolerance: 0.05}}\ncamera:", stages_from("refine_direct")),
+        ("camera:", "surfaces: {dome: {reconstruction: gouraud}}\ncamera:", EXPORT),
     ],
-    ids=["lods", "budget", "tolerance", "reflectance", "seed", "geometry", "camera"],
+    ids=["lods", "budget", "tolerance", "reflectance", "seed", "geometry", "camera", "own-tolerance", "own-way"],
 )
 def test_an_edit_of_the_scene(baked, old, new, expected):
     with edited(baked.scene / "scene.yaml", old, new):
