@@ -117,7 +117,7 @@ def ledger(powers):
         "received": "received directly by elements",
         "residue": "quadrature residue: gathered less shot",
         "not received": "not received: past all elements, and quadrature",
-        "escaped": "escaped after a reflection",
+        "escaped": "escaped after a reflection, or ended on lamps and back faces",
     }
     return [(labels.get(n, n.replace("_", " ")), rgb[n], sum(rgb[n]) / base if base else None) for n in names]
 
