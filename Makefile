@@ -19,7 +19,7 @@ IMPORT_CHECK := import embreex.rtcore_scene, open3d
 # Every recipe that runs something of ours starts with this.
 ACTIVATE = PATH="$$PWD/.venv/bin:$$PATH"; export PATH
 
-.PHONY: bake help setup test lint bench check-export lock clean
+.PHONY: bake help setup test lint bench accuracy check-export lock clean
 
 bake: setup  ## set up, then bake data/scenes/fruit_room into results/fruit_room (the default)
 	@$(ACTIVATE)
@@ -40,6 +40,10 @@ lint: setup  ## ruff over the code; what snakemake --lint says, counted (it asks
 bench: setup  ## error against seconds on the two reference scenes, by whole bakes (minutes)
 	@$(ACTIVATE)
 	python benchmarks/run.py $(ARGS)
+
+accuracy: setup  ## error on hard cases with known answers, into benchmarks/accuracy.md (minutes)
+	@$(ACTIVATE)
+	python benchmarks/accuracy.py $(ARGS)
 
 check-export: bake  ## the exported files in Khronos' validator and a stock viewer (needs node, npm and Chromium)
 	@$(ACTIVATE)

@@ -2,7 +2,17 @@
 
 import numpy as np
 
-from benchmarks.hard_cases.bench import DENSE, Figure, crossings, looked_up, parallel_rectangle, rms, worst
+from benchmarks.hard_cases.bench import (
+    DENSE,
+    STANDARD,
+    Figure,
+    crossings,
+    looked_up,
+    numeric_rectangle,
+    parallel_rectangle,
+    rms,
+    worst,
+)
 from benchmarks.hard_cases.shadows import lamp
 from lib.formats import preflight
 from tests.rooms import cube
@@ -18,8 +28,8 @@ def close_source(bench):
     low, high = np.array([0.0, 0]), np.array([1.0, 1])
     for distance in DISTANCES:
         scene = {"floor": (rectangle(*floor), {}), "lamp": lamp(low, high, distance)}
-        H = bench.maps(scene, {"floor": 0.5, "lamp": 0.0}, bounces=1)["floor"][0][..., 0]
-        H = looked_up(H, (DENSE, DENSE))
+        maps = bench.maps(scene, {"floor": 0.5, "lamp": 0.0}, cheap=STANDARD, bounces=1)
+        H = looked_up(maps["floor"][0][..., 0], (DENSE, DENSE))
         x = crossings(H.shape, *floor)[..., :2]
         lifted = distance - 7e-5 * np.hypot(1, distance)  # where rays leave; matters beside the lamp's rim at 0.01
         truth = parallel_rectangle(x, low, high, lifted)
@@ -27,6 +37,18 @@ def close_source(bench):
         most = max(most, float(H.max()))
     yield Figure("receiver 0.01 to 4 sides from its source, worst RMSE", "closed form", 0.01, max(errors))
     yield Figure("the same, estimate above 1", "never", 1e-6, max(0.0, most - 1))
+
+
+def horizon(bench):
+    """A standing lamp that reaches from below the floor's plane to above it: only what is above counts."""
+    floor = [0.0, 0, 0], [1.0, 0, 0], [0.0, 1, 0]
+    corner, u, v = [-0.1, 0.0, -0.5], [0, 1.0, 0], [0, 0, 1.0]
+    scene = {"floor": (rectangle(*floor), {}), "lamp": (rectangle(corner, u, v), {"E": 1.0, "is_black": True})}
+    maps = bench.maps(scene, {"floor": 0.5, "lamp": 0.0}, cheap=STANDARD, bounces=1)
+    H = looked_up(maps["floor"][0][..., 0], (49, 49))
+    x = crossings(H.shape, *floor).reshape(-1, 3)
+    truth = numeric_rectangle(x, np.tile([0.0, 0, 1], (len(x), 1)), [-0.1, 0, 0], u, [0, 0, 0.5], [1.0, 0, 0])
+    yield Figure("lamp that reaches below the horizon, RMSE", "numeric integration", 0.01, rms(H.ravel(), truth))
 
 
 def lamp_in_ceiling(bench):
@@ -82,4 +104,4 @@ def coincident(bench):
     yield Figure("the same, pairs that no warning names", "0", 0, float(named.count(False)))
 
 
-CASES = [close_source, lamp_in_ceiling, coincident]
+CASES = [close_source, horizon, lamp_in_ceiling, coincident]

@@ -64,11 +64,12 @@ def contact(bench):
     room = {"floor": (rectangle([0, 0, 0], [1, 0, 0], [0, 1, 0]), {})}
     room["lamp"] = lamp(np.array([0.1, 0.1]), np.array([0.9, 0.9]))
     room |= {f"box {k}": (transformed(face, put), {}) for k, face in enumerate(box())}
-    H, _ = bench.maps(room, {name: 0.5 for name in room} | {"lamp": 0.0})["floor"]
+    H, hidden = bench.maps(room, {name: 0.5 for name in room} | {"lamp": 0.0})["floor"]
     x = np.abs(np.linspace(0, 1, len(H)) - 0.5)
     inside = np.ix_(x < 0.15 - 1 / (len(H) - 1), x < 0.15 - 1 / (len(H) - 1))
     error = float(H[inside].max() / H.max())
     yield Figure("floor below a box, a texel from its rim, over the open floor", "0", 0.01, error)
+    yield Figure("the same: texels not known to be buried", "none", 0, float((~hidden[inside]).sum()))
     outside = np.maximum(x[:, None], x[None]) > 0.15 + 1 / (len(H) - 1)
     yield Figure("floor beside that box is lit: dark texels", "none", 0, float((H[outside].min(axis=-1) <= 0).sum()))
 

@@ -1,0 +1,111 @@
+"""The hard cases notice when the code is broken on purpose: each breakage, and the case that must fail."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from benchmarks import accuracy
+from benchmarks.hard_cases.bench import Bench
+from lib.radiosity import form_factors, gather, rows, sampling, shooting
+from lib.visibility import hemisphere, hidden
+from stages import shoot, tessellate
+
+
+def no_receiver_cosine(patch):
+    """Gather rays and element rays uniform over the hemisphere."""
+
+    def uniform(N, points, shift):
+        stretched = np.stack([1 - (1 - points[:, 0]) ** 2, points[:, 1]], axis=1)
+        return hemisphere.cosine_directions(N, stretched, np.stack([0 * shift[:, 0], shift[:, 1]], axis=1))
+
+    for module in (gather, rows):
+        patch.setattr(module, "cosine_directions", uniform)
+
+
+def no_emitter_cosine(patch):
+    """Far facets shine the same in all directions."""
+    disc = form_factors.form_factor_disc
+    towards = lambda D, n, n_facet, area: disc(D, n, -D / np.linalg.norm(D, axis=-1, keepdims=True), area)  # noqa: E731
+    patch.setattr(form_factors, "form_factor_disc", towards)
+
+
+def no_lift(patch):
+    """Rays leave from the exact surface, whatever its mesh does."""
+    make = tessellate.make
+
+    def flat(*args):
+        made = make(*args)
+        return replace(made, sag=np.zeros_like(made.sag))
+
+    patch.setattr(tessellate, "make", flat)
+
+
+def no_clipping(patch):
+    """What is below the horizon counts as well."""
+
+    def whole(vertices, n):
+        total = form_factors._edge(vertices, np.roll(vertices, -1, axis=1), n[:, None]).sum(axis=1)
+        return np.abs(total) / (2 * np.pi)
+
+    patch.setattr(form_factors, "form_factor_polygon", whole)
+
+
+def nothing_hidden(patch):
+    """No sample counts as buried."""
+    none = lambda is_back, *_: np.zeros(len(is_back), dtype=bool)  # noqa: E731
+    for module in (hidden, gather, rows):
+        patch.setattr(module, "is_hidden", none)
+    for module in (sampling, rows):
+        patch.setattr(module, "are_buried", none)
+
+
+def rows_that_sum_to_one(patch):
+    """What escapes comes back."""
+
+    class Normalised(shooting.FormFactors):
+        def __init__(self, *args, **kwargs):
+            super().__init__(*args, **kwargs)
+            total = np.bincount(self._row, self._F, minlength=self.n)
+            self._F = self._F / np.maximum(total, 1e-300)[self._row]
+
+    patch.setattr(shoot, "FormFactors", Normalised)
+
+
+def light_from_behind(patch):
+    """Rays see the radiosity of a surface from its back too."""
+    look_up = gather.LookupTable._look_up
+
+    def both(self, texels, hits):
+        front = SimpleNamespace(face=hits.face, a=hits.a, b=hits.b, t=hits.t, is_back=np.zeros_like(hits.is_back))
+        return look_up(self, texels, front)
+
+    patch.setattr(gather.LookupTable, "_look_up", both)
+
+
+def through_walls(patch):
+    """No shadow rays."""
+    patch.setattr(
+        "lib.visibility.tracer.Tracer.is_blocked", lambda self, origins, D: np.zeros(len(origins), dtype=bool)
+    )
+
+
+BROKEN = {
+    no_receiver_cosine: "spheres",
+    no_emitter_cosine: "lamps",
+    no_lift: "own_tessellation",
+    no_clipping: "horizon",
+    nothing_hidden: "contact",
+    rows_that_sum_to_one: "spheres",
+    light_from_behind: "thin_wall",
+    through_walls: "penumbra",
+}
+
+
+@pytest.mark.filterwarnings("ignore::RuntimeWarning")
+@pytest.mark.parametrize("breakage, case", BROKEN.items(), ids=[f.__name__ for f in BROKEN])
+def test_a_breakage_is_noticed(tmp_path, monkeypatch, breakage, case):
+    breakage(monkeypatch)
+    figures = accuracy.CASES[case](Bench(tmp_path, is_cheap=True))
+    assert not all(figure.holds for figure in figures)
