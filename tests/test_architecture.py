@@ -1,6 +1,7 @@
 """The lines the tree is built along, read from the sources: who imports whom, and what a file owes its reader."""
 
 import ast
+import re
 import sys
 from functools import cache
 from pathlib import Path
@@ -162,3 +163,13 @@ def test_no_module_draws_random_numbers_without_a_generator(path):
     }
     assert used <= allowed
     assert "random" not in imports(path)
+
+
+def test_every_source_is_in_the_list_of_references():
+    """`Cohen et al. 1988` in a docstring or comment is cohen1988 there, and stands there once."""
+    keys = re.findall(r"^@\w+\{(\w+),", (ROOT / "lib" / "references.bib").read_text(encoding="utf-8"), re.MULTILINE)
+    text = "\n".join(path.read_text(encoding="utf-8") for path in LIB)
+    cited = re.findall(r"\b([A-Z][a-z]+)(?:, [A-Z][a-z]+)*(?:\s+et\s+al\.)?,?\s+((?:19|20)\d\d)\b", text)
+    assert len(cited) > 15
+    assert {name.lower() + year for name, year in cited} <= set(keys)
+    assert len(keys) == len(set(keys))
