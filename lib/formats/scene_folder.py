@@ -1,7 +1,8 @@
 """Reads a scene folder: scene.yaml over config/bake.yaml, under what was typed on the command line.
 
 All three share config/scene.schema.json and each is checked against it on its own, so that a message names the source
-that holds the mistake.  Mappings merge key by key; a list or a value replaces the one below it.
+that holds the mistake.  Mappings merge key by key; a list or a value replaces the one below it.  bake.quality stands
+for a bake.tolerance of the same source, which wins where both are given.
 """
 
 import math
@@ -14,6 +15,7 @@ from lib.refusal import refusal
 
 DEFAULTS_FILE = Path(__file__).resolve().parents[2] / "config" / "bake.yaml"
 COMMAND_LINE = "command line"
+QUALITIES = {"preview": 0.03, "standard": 0.01, "final": 0.004}  # bake.quality: names for tolerances
 
 
 @dataclass(frozen=True)
@@ -66,9 +68,22 @@ def read(folder, overrides=None):
     scene_schema.check(scene, mistakes, file, required="geometry" not in typed)
     scene_schema.check(defaults, mistakes, "config/bake.yaml", required=False)
     mistakes.stop()
-    settings = merge(merge(defaults, scene), typed)
+    settings = merge(merge(defaults, without_quality(scene)), without_quality(typed))
     sources = ((COMMAND_LINE, typed), (file, scene), ("config/bake.yaml", defaults))
     return SceneFolder(given.resolve(), file, settings, sources)
+
+
+def without_quality(tree):
+    """Plain dict of one source's checked settings with bake.quality replaced by the tolerance it stands for.
+
+    >>> without_quality({"bake": {"quality": "final"}})
+    {'bake': {'tolerance': 0.004}}
+    """
+    tree = _plain(tree)
+    quality = (tree.get("bake") or {}).pop("quality", None)
+    if quality is not None:
+        tree["bake"].setdefault("tolerance", QUALITIES[quality])
+    return tree
 
 
 def merge(below, above):
