@@ -281,6 +281,7 @@ rule package:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
         textures=rules.budget_reduce.output.textures,
+        budget=rules.budget_reduce.output.table,
         lods=expand(rules.lod_export.output, k=LEVELS),
     output:
         combined=f"{OUT}/scene.glb",
@@ -296,7 +297,7 @@ rule package:
         results=OUT,
     shell:
         "{PYTHON:q} -m stages.package --scene {input.scene:q} --casters {input.casters:q} --textures {input.textures:q}"
-        " --lods {input.lods:q} --materials {params.materials:q} --settings {params.settings:q} --results {params.results:q}"
+        " --budget {input.budget:q} --lods {input.lods:q} --materials {params.materials:q} --settings {params.settings:q} --results {params.results:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
 

@@ -3,7 +3,7 @@
 reads   textured maps of every chunk, casters.npz (closed directions)     (lib.formats.textured_maps, .casters)
         settings: {"budget": bytes, "profile": "standard" or "lightmap", "order": "loss" or "loss_per_byte"}
 writes  textures.npz, all surfaces                                         (lib.formats.textured_maps)
-        budget.json: S before and after, who gave up what
+        budget.json: S before and after, who gave up what; the automatic exposure of the textures before
 
 `standard` exports light on its base texture and reduces those maps; `lightmap` exports and reduces the light alone,
 and the base textures count as fixed bytes.  `loss` takes the smallest D_i first, as the paper does; `loss_per_byte` the
@@ -15,7 +15,7 @@ import dataclasses
 from lib import door
 from lib.formats import casters, textured_maps
 from lib.formats.artefact import write_json
-from lib.maps import budget
+from lib.maps import budget, exposure
 from lib.refusal import Refusal
 
 PROFILES = {"standard": "final", "lightmap": "light"}
@@ -31,7 +31,8 @@ def arguments(parser):
 
 def body(args, cost):
     x = textured_maps.merge([textured_maps.load(path) for path in args.maps])
-    is_closed = casters.load(args.casters).is_closed
+    shapes = casters.load(args.casters)
+    is_closed = shapes.is_closed
     profile = args.settings.get("profile", "standard")
     if profile not in PROFILES:
         raise Refusal(f"profile: {profile!r}, allowed are {' and '.join(PROFILES)}")
@@ -45,7 +46,9 @@ def body(args, cost):
     after, steps, D = budget.reduce(before, is_closed[before.surface], T, fixed, order)
 
     textured_maps.save(args.out, dataclasses.replace(x, **{PROFILES[profile]: after}))
-    write_json(args.table, table(x.names, profile, order, T, fixed, before, after, steps, D))
+    record = table(x.names, profile, order, T, fixed, before, after, steps, D)
+    # Brightness is that of the whole light: a smaller budget must not change it.
+    write_json(args.table, {**record, "exposure": exposure.automatic(x.final, shapes.area[x.final.surface])})
     cost.notes["levels_removed"] = len(steps)
 
 

@@ -2,6 +2,7 @@
 
 reads   scene.npz, casters.npz, textures.npz, lod_<k>.npz of every level, finest first, reflectances
                                                   (lib.formats.scene, .casters, .textured_maps, .lod_mesh)
+        budget.json: the automatic exposure; without it that of textures.npz
         settings: {"exposure": "auto" or a number > 0, "reconstruction": {surface: "texture" | "gouraud"}}
 writes  RESULTS/textures/<surface>.png, scene_LOD<k>.gltf and .bin, scene.glb, lods.json
 
@@ -28,6 +29,7 @@ def arguments(parser):
     parser.add_argument("--scene", required=True, metavar="FILE", help="scene.npz")
     parser.add_argument("--casters", required=True, metavar="FILE", help="casters.npz")
     parser.add_argument("--textures", required=True, metavar="FILE", help="textures.npz")
+    parser.add_argument("--budget", metavar="FILE", help="budget.json of budget_reduce")
     parser.add_argument("--materials", required=True, metavar="FILE", help="JSON: rho_avg of every surface")
     parser.add_argument("--lods", required=True, nargs="+", metavar="FILE", help="lod_<k>.npz, finest first")
     parser.add_argument("--settings", type=door.json_text, default={}, metavar="JSON", help="exposure")
@@ -39,7 +41,10 @@ def body(args, cost):
     levels = [lod_mesh.load(path) for path in args.lods]
     results, mapped = Path(args.results), maps.final.surface
 
-    exposure = chosen_exposure(args.settings.get("exposure", "auto"), maps.final, shapes.area[mapped])
+    asked = args.settings.get("exposure", "auto")
+    if asked == "auto" and args.budget:
+        asked = read_json(args.budget)["exposure"]
+    exposure = chosen_exposure(asked, maps.final, shapes.area[mapped])
     extras = {"unit": "B_over_pi", "encoding": "srgb", "exposure": exposure}
     rho_avg, ways = read_json(args.materials)["rho_avg"], args.settings.get("reconstruction", {})
     looks = export.looks(x, shapes, maps, rho_avg, exposure, ways, levels, results)

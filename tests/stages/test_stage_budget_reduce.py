@@ -99,6 +99,12 @@ def test_the_least_detail_is_given_up_and_the_table_says_who(tmp_path):
     assert [step["surface"] for step in table["steps"]] == ["wall"] and table["steps"][-1]["S"] == S
 
 
+def test_a_smaller_budget_does_not_change_the_brightness(tmp_path):
+    options = build(tmp_path)
+    whole, reduced = (run(tmp_path, options, budget=T)[2]["exposure"] for T in (FULL, FULL // 4))
+    assert reduced == whole > 0
+
+
 def test_the_light_map_profile_reduces_the_light_and_counts_pictures_as_fixed(tmp_path):
     options = build(tmp_path)
     fixed = budget.gpu_bytes(100, 50)  # one file on three surfaces counts once

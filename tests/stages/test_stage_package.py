@@ -56,6 +56,7 @@ def run(files, settings=None, n_levels=2, results="results", ways=None):
         argv += [f"--{option}", str(files / f"{option}.npz")]
     argv += ["--materials", str(files / "materials.json"), "--settings", json.dumps(settings)]
     argv += ["--lods", *(str(files / f"lod_{k}.npz") for k in range(n_levels))]
+    argv += ["--budget", str(files / "budget.json")] if (files / "budget.json").exists() else []
     return package.main([*argv, "--results", str(files / results)]), files / results
 
 
@@ -117,6 +118,9 @@ def test_exposure_takes_the_brightest_reflected_percent_to_white(files):
     assert 1 / found * np.pi == pytest.approx(1.0, abs=0.25)  # the ramp's bright end; the lamp does not count
     material = read_json(results / "scene_LOD0.gltf")["materials"][0]
     assert material["extras"]["moeller_bake"] == {"unit": "B_over_pi", "encoding": "srgb", "exposure": found}
+    write_json(files / "budget.json", {"exposure": 2 * found})  # that of the textures before they were reduced
+    used = [read_json(run(files, asked)[1] / "lods.json")["exposure"] for asked in ({}, {"exposure": 7})]
+    assert used == [2 * found, 7]
     dark = mapset.pack([0], [[1, 1]], [0], [np.zeros((2, 2, 3))])
     assert exposure.automatic(dark, np.ones(1)) == 1.0
 
