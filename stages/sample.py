@@ -58,7 +58,9 @@ def packed(surfaces, base, lit, elements, grids, groups):
             [np.zeros(0, np.int32), *(np.arange(grids.first[s], grids.first[s + 1], dtype=np.int32) for s in lit)]
         ),
         np.concatenate([np.zeros((0, width), np.int32), *(r.entries for r in rows)]),
+        np.concatenate([np.zeros((0, width), np.uint8), *(r.met for r in rows)]),
         np.concatenate([np.zeros((0, 16), bool), *(r.is_hidden for r in rows)]),
+        np.concatenate([np.zeros(0, bool), *(e.is_alone for e in elements)]),
         np.concatenate([np.zeros(0), *(e.area for e in elements)]),
         np.concatenate([np.zeros((0, groups, 3)), *(e.H_direct.reshape(-1, groups, 3) for e in elements)]),
     )

@@ -10,10 +10,12 @@ settings: n_elements, convergence, bounces ("converge" or n)
 import numpy as np
 
 from lib import door
-from lib.elements.grids import element_grids
+from lib.elements.grids import POINTS, element_grids
 from lib.formats import artefact, casters, samples, scene, solution
 from lib.radiosity.shooting import DoesNotConverge, FormFactors, solve
 from lib.refusal import Refusal
+
+ABSORBED = -2  # of lib.radiosity.rows, which casts rays and is not loaded here
 
 
 def arguments(parser):
@@ -33,7 +35,7 @@ def body(args, cost):
     reflects = (np.array(x.role) == "full") & ~np.asarray(x.is_black)
     grids = element_grids(mesh.area, mesh.extent, mesh.is_planar, reflects, chosen["n_elements"])
     chunks = [samples.load(path) for path in args.samples]
-    entries, share, area, H_direct = collected(chunks, grids.total, len(x.groups))
+    entries, hidden, is_alone, area, H_direct = collected(chunks, grids.total, len(x.groups))
     surface = np.repeat(np.arange(len(x.names)), grids.n_u * grids.n_v)
     bounces = None if chosen["bounces"] == "converge" else int(chosen["bounces"])
     F = FormFactors(entries)
@@ -57,7 +59,8 @@ def body(args, cost):
         args.out,
         solution.Solution(
             np.maximum(found.H - H_direct, 0).astype(np.float32),
-            share.astype(np.float32),
+            is_alone,
+            hidden,
             F.spread(found.H.sum(axis=1) * rho[surface]).astype(np.float32),
             found.H.sum(axis=1).max(axis=1, initial=0.0).astype(np.float32),
             grids.n_u,
@@ -73,15 +76,20 @@ def body(args, cost):
 
 
 def collected(chunks, total, groups):
-    """Entries (n, R), visible share (n,), visible area (n,) and direct light (n, G, 3) of all elements, in order."""
+    """Entries (n, R), hidden points (n, 16), is_alone (n,), visible area (n,) and direct light (n, G, 3) of all
+    elements, in order.  What meets a hidden point of an element, the far side of a wall on it, is absorbed.
+    """
     width = max((c.entries.shape[1] for c in chunks if len(c.entries)), default=1)
-    entries, share = np.full((total, width), -3, dtype=np.int32), np.zeros(total)
-    area, H_direct = np.zeros(total), np.zeros((total, groups, 3))
+    entries = np.full((total, width), -3, dtype=np.int32)
+    met, hidden = np.zeros(entries.shape, dtype=np.uint8), np.ones((total, POINTS**2), dtype=bool)
+    area, H_direct, is_alone = np.zeros(total), np.zeros((total, groups, 3)), np.zeros(total, dtype=bool)
     for c in chunks:
         if len(c.element):
-            entries[c.element], share[c.element] = c.entries, (~c.is_hidden).mean(axis=1)
-            area[c.element], H_direct[c.element] = c.area, c.H_direct
-    return entries, share, area, H_direct
+            entries[c.element], met[c.element], hidden[c.element] = c.entries, c.met, c.is_hidden
+            is_alone[c.element], area[c.element], H_direct[c.element] = c.is_alone, c.area, c.H_direct
+    if total:
+        entries = np.where((entries >= 0) & hidden[entries, met], ABSORBED, entries)
+    return entries, hidden, is_alone, area, H_direct
 
 
 def main(argv=None):

@@ -6,7 +6,7 @@ import numpy as np
 
 from lib.formats import artefact
 
-KIND, VERSION = "samples", 1
+KIND, VERSION = "samples", 2
 
 
 @dataclass(frozen=True)
@@ -15,8 +15,9 @@ class Samples:
 
     surface (m,) int32 surfaces with maps, ascending; level (m,) int32, base level of their direct trees
     first (m + 1,) int64 offsets of their lattices in value (N, 3 G) float32 [W/m^2], hidden (N,) bool, noise (N,)
-    float32 element (k,) int32 global numbers; entries (k, R) int32; is_hidden (k, 16) bool; area (k,) float64 visible
-    area in frame units; H_direct (k, G, 3) float64 [W/m^2]
+    float32
+    element (k,) int32 global numbers; entries (k, R) int32, met (k, R) uint8, is_hidden (k, 16) bool as Rows has them;
+    is_alone (k,) bool as Parts has it; area (k,) float64 visible area in frame units; H_direct (k, G, 3) float64
     """
 
     surface: np.ndarray
@@ -27,7 +28,9 @@ class Samples:
     noise: np.ndarray
     element: np.ndarray
     entries: np.ndarray
+    met: np.ndarray
     is_hidden: np.ndarray
+    is_alone: np.ndarray
     area: np.ndarray
     H_direct: np.ndarray
 

@@ -6,13 +6,14 @@ import numpy as np
 
 from lib.formats import artefact
 
-KIND, VERSION = "solution", 1
+KIND, VERSION = "solution", 2
 
 
 @dataclass(frozen=True)
 class Solution:
-    """H_indirect (n, G, 3) float32 bounced irradiance of the elements >= 0 [W/m^2]; share (n,) float32 visible share,
-    0..1 spread (n,) float32 standard deviation over directions of the reflected light that each element sees [W/m^2]
+    """H_indirect (n, G, 3) float32 bounced irradiance of the elements >= 0 [W/m^2]; is_alone (n,) bool, nothing
+    is interpolated across the element; is_hidden (n, 16) bool, its points
+    spread (n,) float32 standard deviation over directions of the reflected light that each element sees [W/m^2]
     H_element (n,) float32 irradiance of the elements, all groups, largest channel
     n_u, n_v (surfaces,) int64 element grid of each surface; rho (surfaces, 3) float64
     mean_H (3,) area-weighted mean irradiance of the scene's elements, all groups
@@ -20,7 +21,8 @@ class Solution:
     history (rounds, 2) shots and unshot share; ledger {name: (G, 3) list} powers [W]; facts {name: number}."""
 
     H_indirect: np.ndarray
-    share: np.ndarray
+    is_alone: np.ndarray
+    is_hidden: np.ndarray
     spread: np.ndarray
     H_element: np.ndarray
     n_u: np.ndarray
@@ -43,7 +45,7 @@ ARRAYS = [name for name in Solution.__dataclass_fields__ if name not in ("ledger
 
 def check(x):
     """Raise ValueError naming the field that breaks the contract."""
-    for name in ("H_indirect", "share", "spread", "rho", "mean_H", "H_surface"):
+    for name in ("H_indirect", "spread", "rho", "mean_H", "H_surface"):
         values = getattr(x, name)
         if not np.isfinite(values).all() or (values < 0).any():
             raise ValueError(f"solution: {name}: NaN, Inf or negative")

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lib.elements.grids import at_centres
+from lib.elements.grids import POINTS, at_centres
 from lib.elements.lattice import OFFSET
 from lib.visibility.hemisphere import cosine_direction_each, cosine_directions
 from lib.visibility.hidden import is_hidden
@@ -39,20 +39,33 @@ class RadiosityMap:
     width: float
 
 
-def radiosity_map(H_direct, hidden, H_element, share, grid, rho, closed, area):
+def radiosity_map(H_direct, hidden, H_element, points_hidden, is_alone, grid, rho, closed, area):
     """rho (H_direct + H_indirect) on the lattice of a direct map.
 
-    H_direct (h, w, G, 3), hidden (h, w); H_element (n_v n_u, G, 3) indirect, share (n_v n_u,) visible share, grid
-    (n_u, n_v), rho (3,), area of the surface in the scene's frame.
+    H_direct (h, w, G, 3), hidden (h, w); H_element (n_v n_u, G, 3) indirect, points_hidden (n_v n_u, 16), is_alone
+    (n_v n_u,) whether the element is looked up without its neighbours; grid (n_u, n_v), rho (3,), area of the surface
+    in the scene's frame.
     """
     h, w, G = H_direct.shape[:3]
     u, v = np.linspace(0, 1, w), np.linspace(0, 1, h)
-    indirect = at_centres(H_element.reshape(len(H_element), -1), share, *grid, u, v, closed)
+    H_element, share = H_element.reshape(len(H_element), -1), (~points_hidden).mean(axis=1)
+    indirect = at_centres(H_element, share * ~is_alone, *grid, u, v, closed)
+    if is_alone.any():
+        (j, b), (i, a) = _cells_of(v, grid[1]), _cells_of(u, grid[0])
+        element, point = j[:, None] * grid[0] + i, b[:, None] * POINTS + a
+        own = np.where(points_hidden[element, point][..., None], 0.0, H_element[element])
+        indirect = np.where(is_alone[element][..., None], own, indirect)
     rho = np.tile(rho, G)
     direct = H_direct.reshape(h, w, -1) * rho
     value = direct + indirect * rho
     width = float(np.sqrt(area / (grid[0] * grid[1])))
     return RadiosityMap(value.astype(np.float32), direct.astype(np.float32), (~hidden).astype(np.float32), rho, width)
+
+
+def _cells_of(t, n):
+    """Element and point along one direction at parameters t."""
+    cell = np.minimum((t * n * POINTS).astype(int), n * POINTS - 1)
+    return cell // POINTS, cell % POINTS
 
 
 class LookupTable:

@@ -143,7 +143,7 @@ def lookup_table(world, direct, solution, follows_near=True):
     """Radiosity maps of every surface that reflects.
 
     direct : {surface: (value (h, w, G, 3), known, hidden)} direct trees on their lattices
-    solution : has H_indirect (n, G, 3), share (n,), n_u, n_v, first, rho (surfaces, 3)
+    solution : has H_indirect (n, G, 3), is_hidden (n, 16), is_alone (n,), n_u, n_v, first, rho (surfaces, 3)
     follows_near : near hits are followed on, which adds a reflection: not where they are numbered
     """
     maps = {}
@@ -156,7 +156,8 @@ def lookup_table(world, direct, solution, follows_near=True):
             value,
             hidden,
             solution.H_indirect[part],
-            solution.share[part],
+            solution.is_hidden[part],
+            solution.is_alone[part],
             grid,
             solution.rho[s],
             closed,

@@ -21,10 +21,19 @@ BATCH = 64  # elements at once
 
 @dataclass(frozen=True)
 class Rows:
-    """entries (m, R) int32: element met, or NOTHING, ABSORBED, NO_RAY; is_hidden (m, 16) bool per point."""
+    """entries (m, R) int32: element met, or NOTHING, ABSORBED, NO_RAY; met (m, R) uint8: at which of its points;
+    is_hidden (m, 16) bool per point."""
 
     entries: np.ndarray
+    met: np.ndarray
     is_hidden: np.ndarray
+
+
+def without(rows, dropped):
+    """Rows whose points `dropped` (m, 16) bool are hidden too: their rays do not count."""
+    m, points = dropped.shape
+    entries = np.where(dropped[:, :, None], NO_RAY, rows.entries.reshape(m, points, -1)).reshape(rows.entries.shape)
+    return Rows(entries, rows.met, rows.is_hidden | dropped)
 
 
 def element_rows(x, N, shift, R, tracer, mesh, grids):
@@ -37,6 +46,7 @@ def element_rows(x, N, shift, R, tracer, mesh, grids):
     per_point = max(1, R // points)
     sequence = r2(per_point * points)
     entries = np.empty((m, per_point * points), dtype=np.int32)
+    met = np.empty(entries.shape, dtype=np.uint8)
     hidden = np.empty((m, points), dtype=bool)
     for first in range(0, m, BATCH):
         part = slice(first, first + BATCH)
@@ -48,7 +58,7 @@ def element_rows(x, N, shift, R, tracer, mesh, grids):
             D[:, p] = cosine_directions(normals[p::points], sequence[p::points], shift[part])
         origins = np.repeat(x[part].reshape(-1, 3).astype(np.float32), per_point, axis=0)
         hits = tracer.closest(origins, D.reshape(-1, 3))
-        element = mesh.element_of(hits, grids)
+        element, point = mesh.element_of(hits, grids)
         in_shell = mesh.is_shell(hits.face)
         shape = (k * points, per_point)
         buried = is_hidden(hits.is_back.reshape(shape), in_shell.reshape(shape))
@@ -57,6 +67,6 @@ def element_rows(x, N, shift, R, tracer, mesh, grids):
             shifts = np.repeat(shift[part], points, axis=0)[doubt]
             buried[doubt] = are_buried(x[part].reshape(-1, 3)[doubt], normals[doubt], shifts, tracer, mesh)
         element = np.where(buried[:, None], NO_RAY, element.reshape(shape))
-        entries[part] = element.reshape(k, -1)
+        entries[part], met[part] = element.reshape(k, -1), point.reshape(k, -1)
         hidden[part] = buried.reshape(k, points)
-    return Rows(entries, hidden)
+    return Rows(entries, met, hidden)

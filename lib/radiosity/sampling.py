@@ -4,14 +4,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lib.elements.grids import by_element, point_parameters
+from lib.elements.grids import POINTS, by_element, point_parameters
 from lib.elements.lattice import OFFSET, receivers
+from lib.elements.parts import parts
 from lib.nurbs.evaluate import evaluate_grid, frame_grid
 from lib.radiosity.direct import direct_light
-from lib.radiosity.rows import Rows, element_rows
+from lib.radiosity.rows import Rows, element_rows, without
 from lib.radiosity.world import FINEST
 from lib.visibility.hidden import are_buried
 from lib.visibility.qmc import shift, stream
+
+FEW_RAYS = (16, 16)  # to a lamp from one of an element's 16 points
 
 
 @dataclass(frozen=True)
@@ -90,9 +93,11 @@ def base_lattice(world, surfaces, seed, level, shadow_rays):
 
 @dataclass(frozen=True)
 class Elements:
-    """Elements of one surface: rows, visible area (k,), mean direct light over visible points H_direct (k, 3 G)."""
+    """Elements of one surface: rows, is_alone (k,) bool as Parts has it, visible area (k,), mean direct light over
+    visible points H_direct (k, 3 G)."""
 
     rows: Rows
+    is_alone: np.ndarray
     area: np.ndarray
     H_direct: np.ndarray
 
@@ -115,13 +120,59 @@ def surface_elements(world, s, seed, grids, R, base):
     if R:
         rows = element_rows(x, by_element(N), shifts, R, world.tracer, world.mesh, grids)
     else:
-        rows = Rows(np.full((len(x), 1), -1, dtype=np.int32), np.zeros(density.shape, dtype=bool))
+        none = np.full(density.shape, -1, dtype=np.int32)
+        rows = Rows(none, np.zeros(none.shape, dtype=np.uint8), np.zeros(density.shape, dtype=bool))
+    found, is_walled = _parts(world, s, S + N * OFFSET, rows.is_hidden, n_u, n_v)
+    rows = without(rows, ~found.keeps & ~rows.is_hidden)
     visible = ~rows.is_hidden
     area = (density * visible).mean(axis=1) / (n_u * n_v)
     value, hidden = base[:2]
-    light = by_element(_bilinear(value, hidden, u, v))
+    light = _bilinear(value, hidden, u, v)
+    beside = _beside_walls(is_walled, hidden.shape)
+    if beside.any():  # between samples of two rooms nothing can be interpolated
+        key = stream(f"{seed} elements", world.scene.names[s])
+        j, i = np.nonzero(beside)
+        lifted = S[beside] + N[beside] * (world.casters.sag[s] + OFFSET)
+        points = Points(np.full(len(j), s), None, None, lifted, N[beside], shift(key, i, j))
+        light[beside] = direct_at(world, points, FEW_RAYS)[0].H.reshape(len(j), -1)
+    light = by_element(light)
     count = np.maximum(visible.sum(axis=1), 1)[:, None]
-    return Elements(rows, area, (light * visible[..., None]).sum(axis=1) / count)
+    return Elements(rows, found.is_alone, area, (light * visible[..., None]).sum(axis=1) / count)
+
+
+def _parts(world, s, x, hidden, n_u, n_v):
+    """Parts of the elements of surface s, and which links between its points x (4 n_v, 4 n_u, 3) are blocked."""
+    usable = _by_point(~hidden, n_u, n_v)
+    blocked_u, blocked_v = np.zeros(usable[:, 1:].shape, dtype=bool), np.zeros(usable[1:].shape, dtype=bool)
+    if world.casters.is_planar[s]:  # on a curved surface the straight way runs through the surface itself
+        for blocked, a, b in ((blocked_u, x[:, :-1], x[:, 1:]), (blocked_v, x[:-1], x[1:])):
+            a, b = (np.ascontiguousarray(p.reshape(-1, 3), dtype=np.float32) for p in (a, b))
+            blocked[...] = world.tracer.is_blocked(a, b - a).reshape(blocked.shape)
+    return parts(blocked_u, blocked_v, usable), (blocked_u, blocked_v)
+
+
+def _by_point(array, n_u, n_v):
+    """The inverse of by_element: (n_v n_u, 16) as (4 n_v, 4 n_u)."""
+    return array.reshape(n_v, n_u, POINTS, POINTS).swapaxes(1, 2).reshape(n_v * POINTS, n_u * POINTS)
+
+
+def _beside_walls(blocked, shape):
+    """(4 n_v, 4 n_u) bool: points in cells of the base lattice (h, w) in which a link between points is blocked."""
+    blocked_u, blocked_v = blocked
+    rows, columns = blocked_u.shape[0], blocked_v.shape[1]
+    walled = np.zeros((rows, columns), dtype=bool)
+    for link, first, last in (
+        (blocked_u, np.s_[:, :-1], np.s_[:, 1:]),
+        (blocked_v, np.s_[:-1], np.s_[1:]),
+    ):
+        walled[first] |= link
+        walled[last] |= link
+    cell_j = ((np.arange(rows) + 0.5) / rows * (shape[0] - 1)).astype(int)
+    cell_i = ((np.arange(columns) + 0.5) / columns * (shape[1] - 1)).astype(int)
+    cells = np.zeros((shape[0] - 1, shape[1] - 1), dtype=bool)
+    j, i = np.nonzero(walled)
+    cells[cell_j[j], cell_i[i]] = True
+    return cells[cell_j][:, cell_i]
 
 
 def _bilinear(value, hidden, u, v):

@@ -24,6 +24,8 @@ OVERSHOOT = 0.5  # c: halves the shots against 0; 1 is worse
 MOST_GAIN = 100.0  # bound of 1 / (1 - rho_avg)
 MOST_ROUNDS, MOST_SWEEPS = 5000, 20000
 LEAST_SWEEPS = 6  # before the ratio of two changes tells how light dies
+MOST_GROWTH = 1e3  # of the changes, beside the least there was: light that grows
+DARK = 1e-9  # of the brightest element: what shooting left in a dark room dies out, and need not be waited for
 STAGNANT = 100  # rounds without a hundredth of progress: the light does not die out
 
 
@@ -194,6 +196,7 @@ def _sweep(H_direct, H, rho, area, F, residual):
     slow = float(_round_trip(rho, area, F).max(initial=0.0))
     change = H_direct + F.gather(rho * H) - H
     previous, before = _relative(change, H), 0.0
+    least = previous
     for sweep in range(1, MOST_SWEEPS + 1):
         H, change = H + change, F.gather(rho * change)
         turn = change - H_direct
@@ -205,13 +208,15 @@ def _sweep(H_direct, H, rho, area, F, residual):
         previous, before = size, q
         if size == 0 or (sweep >= LEAST_SWEEPS and bound < 1 and size / (1 - bound) < residual):
             return np.maximum(H, H_direct), sweep
-        if not np.isfinite(size) or (sweep > 50 and q > 1):
+        least = min(least, size)
+        if not np.isfinite(size) or size > MOST_GROWTH * least:
             raise DoesNotConverge("light grows with every bounce")
     raise DoesNotConverge(f"{MOST_SWEEPS} sweeps still change the light by {size:.3g}")
 
 
 def _relative(change, H):
-    """Mean of |change| over the light of each element, of those that have any."""
+    """Mean of |change| over the light of each element, of those that have any; DARK counts as none."""
     size = np.abs(change)
     lit = size + np.abs(H)
-    return float((size / np.where(lit > 0, lit, 1.0)).sum() / max((lit > 0).sum(), 1))
+    floor = DARK * lit.max(initial=0.0)
+    return float((size / np.maximum(lit, max(floor, 1e-300))).sum() / max((lit > floor).sum(), 1))

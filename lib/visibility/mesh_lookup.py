@@ -2,6 +2,8 @@
 
 import numpy as np
 
+from lib.elements.grids import POINTS
+
 
 class MeshLookup:
     """Per-face tables over the caster mesh.
@@ -24,22 +26,23 @@ class MeshLookup:
         return self._is_shell[face]
 
     def element_of(self, hits, grids):
-        """Element number of each hit (n,) int32; -1 where nothing was met, -2 on back faces and surfaces without
-        elements.
+        """Element number of each hit (n,) int32: -1 where nothing was met, -2 on back faces and surfaces without
+        elements; and which of the element's 16 points is nearest (n,) uint8.
         """
         met = hits.face >= 0
         face = np.where(met, hits.face, 0)
         if not len(self.face_surface):
-            return np.full(len(face), -1, dtype=np.int32)
+            return np.full(len(face), -1, dtype=np.int32), np.zeros(len(face), dtype=np.uint8)
         surface = self.face_surface[face]
         corners = self._uv[face]
         uv = corners[:, 0] + hits.a[:, None] * corners[:, 1] + hits.b[:, None] * corners[:, 2]
         n_u, n_v = grids.n_u[surface], grids.n_v[surface]
-        i = np.clip((uv[:, 0] * n_u).astype(np.int64), 0, np.maximum(n_u - 1, 0))
-        j = np.clip((uv[:, 1] * n_v).astype(np.int64), 0, np.maximum(n_v - 1, 0))
-        element = grids.first[surface] + j * n_u + i
+        i = np.clip((uv[:, 0] * n_u * POINTS).astype(np.int64), 0, np.maximum(POINTS * n_u - 1, 0))
+        j = np.clip((uv[:, 1] * n_v * POINTS).astype(np.int64), 0, np.maximum(POINTS * n_v - 1, 0))
+        element = grids.first[surface] + j // POINTS * n_u + i // POINTS
+        point = (j % POINTS * POINTS + i % POINTS).astype(np.uint8)
         element = np.where(hits.is_back | (n_u == 0), -2, element)
-        return np.where(met, element, -1).astype(np.int32)
+        return np.where(met, element, -1).astype(np.int32), point
 
     def texel_coordinates(self, width, height):
         """Faces in texel units of their surface's map: (m + 1, 6) float32 rows s, t, ds_a, dt_a, ds_b, dt_b; the last

@@ -206,3 +206,17 @@ def test_columns_at_a_seam_are_equal(tmp_path):
     assert (H[:, 0] == H[:, -1]).all()
     step = np.abs(np.diff(H[..., 0, 0], axis=1))
     assert max(step[:, 0].max(), step[:, -1].max()) <= 2 * step.max() + FLOAT32
+
+
+@pytest.mark.parametrize("where", [0.5, 0.43, 4 / 7])
+def test_behind_a_thin_wall_it_is_dark_though_floor_and_ceiling_run_on(tmp_path, where):
+    """One hall, two rooms: a sheet with two faces across it; through elements, between elements, on their border."""
+    hall = cube(1.0)
+    hall["lamp"] = (rectangle([0.1, 0.6, 0.9], [0.2, 0, 0], [0, -0.2, 0]), {"E": 100.0, "is_black": True})
+    hall["lit"] = (rectangle([where, 0, 0], [0, 0, 1], [0, 1, 0]), {})
+    hall["dark"] = (rectangle([where, 0, 0], [0, 1, 0], [0, 0, 1]), {})
+    rho = {name: 0.8 for name in hall} | {"lamp": 0.0}
+    maps = baked(tmp_path, hall, rho, max_level=7)
+    far, near = maps["wall 5"][0], maps["wall 4"][0]  # the walls x = 1 and x = 0
+    assert far.mean() <= 5e-3 * near.mean()  # what one texel of the finest level lets through by interpolation
+    assert where != 0.5 or not far.any()  # on a line of the lattice: nothing at all

@@ -99,7 +99,7 @@ def make(folder):
     solved = dict.fromkeys(solution.Solution.__dataclass_fields__, no(2, np.float32))  # one number an element
     solved.update(
         H_indirect=no((2, 1, 3), np.float32),
-        share=np.ones(2, np.float32),
+        is_hidden=no((2, 16), bool),
         n_u=np.array([1, 1, 0]),
         n_v=np.array([1, 1, 0]),
         rho=np.full((3, 3), 0.5),

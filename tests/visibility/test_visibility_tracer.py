@@ -128,7 +128,9 @@ def test_hits_become_elements():
     mesh, grids = lookup()
     origins = [[0.2, 0.2, 1], [0.7, 0.2, 1], [0.9, 0.9, 1], [5, 5, 1], [0.2, 0.2, -1]]
     hits = Tracer(V, F).closest(*rays(origins, [DOWN] * 4 + [UP]))
-    assert mesh.element_of(hits, grids).tolist() == [0, 1, -2, -1, -2]
+    element, point = mesh.element_of(hits, grids)
+    assert element.tolist() == [0, 1, -2, -1, -2]
+    assert point[:2].tolist() == [1, 1]  # row 0, column 1 of the 4 x 4 of each
 
 
 def test_elements_of_a_finer_grid():
@@ -138,7 +140,10 @@ def test_elements_of_a_finer_grid():
     uv = np.random.default_rng(4).random((500, 2))
     hits = Tracer(V, F).closest(*rays(np.append(uv, np.ones((500, 1)), axis=1), np.tile(DOWN, (500, 1))))
     expected = np.floor(uv[:, 1] * 3) * 4 + np.floor(uv[:, 0] * 4)
-    assert (mesh.element_of(hits, grids) == expected).mean() > 0.999  # float32 decides on the lines between
+    element, point = mesh.element_of(hits, grids)
+    assert (element == expected).mean() > 0.999  # float32 decides on the lines between
+    nearest = np.floor(uv[:, 1] * 12) % 4 * 4 + np.floor(uv[:, 0] * 16) % 4
+    assert (point == nearest).mean() > 0.999
 
 
 def test_shells_and_normals():
