@@ -38,6 +38,9 @@ def body(args, cost):
         maps[s] = tree.roots, level, H, hidden
         stats[x.names[s]] = figures(tree, other, level, H, hidden)
     light_maps.save(args.out, light_maps.LightMaps(packed(maps, len(x.groups)), stats))
+    measured = sum(max(row["level_direct"], row["level_indirect"]) for row in stats.values())
+    cost.notes["levels_dropped"] = measured - sum(row["level"] for row in stats.values())
+    cost.notes["hidden_samples"] = sum(row["hidden"] for row in stats.values())
 
 
 def figures(direct, indirect, level, H, hidden):

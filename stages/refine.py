@@ -42,8 +42,9 @@ def body(args, cost):
             world, unpacked(x, world), chosen["seed"], tau, chosen["top"], chosen["shadow_rays"]
         )
         cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))
-    elif chosen["bounces"] == 1:
+    elif chosen["bounces"] == 1 or not np.any(solved.mean_H):
         done = {}
+        cost.notes["no_gather"] = len(world.chunk(args.chunks, args.chunk))
     else:
         direct = {s: t.dense() for path in args.direct for s, t in trees.load(path, "direct")[0].items()}
         mine = world.chunk(args.chunks, args.chunk)

@@ -31,13 +31,15 @@ def body(args, cost):
     mine = world.chunk(args.chunks, args.chunk)
     level, seed = chosen["base_direct"], chosen["seed"]
     base, spared = base_lattice(world, mine, seed, level, chosen["first_shadow_rays"])
-    rays = 0 if chosen["bounces"] == 1 else chosen["rays_per_element"]
+    bounces = chosen["bounces"] != 1 and len(world.emitters.E) > 0
+    rays = chosen["rays_per_element"] if bounces else 0
     lit = [s for s in mine if grids.n_u[s]]
     elements = [surface_elements(world, s, seed, grids, rays, base[s]) for s in lit]
     samples.save(args.out, packed(mine, base, lit, elements, grids, world.n_groups))
     cost.rays = world.tracer.rays
     cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))
     cost.notes["hidden_points"] = int(sum(e.rows.is_hidden.sum() for e in elements))
+    cost.notes["no_rows"] = 0 if bounces else int(sum(len(e.area) for e in elements))
 
 
 def packed(surfaces, base, lit, elements, grids, groups):

@@ -28,12 +28,16 @@ SAVINGS = {
     "below_horizon": ("lights below the horizon or behind: no shadow ray", "pairs of sample and light"),
     "dim": ("dim lights counted as unblocked", "pairs of sample and light"),
     "agreed": ("lights whose first shadow rays agreed", "pairs of sample and light"),
+    "hidden_points": ("points of elements buried in other things: no part of any row", "points"),
+    "hidden_samples": ("samples buried in other things: not refined, not interpolated", "texels"),
+    "no_rows": ("one bounce, or no light: no element row", "elements"),
+    "no_gather": ("one bounce, or no light: no final gather", "surfaces"),
     "few_texels": ("maps that ended at their root grid", "maps"),
     "one_colour": ("maps of one even colour: no texture", "maps"),
     "levels_dropped": ("deepest levels dropped before writing, all within a quarter of the tolerance", "levels"),
 }
 
-COUNTED = {*SAVINGS, "hidden_points", "levels_removed", "textured_surfaces", "skipped"}
+COUNTED = {*SAVINGS, "levels_removed", "textured_surfaces", "skipped"}
 
 
 def stage_costs(costs, run):
