@@ -53,7 +53,7 @@ def body(args, cost):
     elif "deviation" in asked and level.mesh.distance.max() > level.tolerance:
         reached, wanted = level.mesh.distance.max() * shapes.scale, level.tolerance * shapes.scale
         note = f"{wanted:.3g} m asked for, {reached:.3g} m reached"
-    if note:
+    if note and "share" not in asked:  # who asks for a share asks for no number: lods.json tells it
         door.warn(f"lods[{k}]: {note}")
     lod_mesh.save(args.out, in_metres(level, shapes, np.asarray(x.flip, dtype=bool), k, asked, note))
     cost.notes.update(level=k, triangles=len(level.mesh.F), distance=float(level.mesh.distance.max()) * shapes.scale)

@@ -11,7 +11,7 @@ from lib.radiosity.quality import quality
 RAYS_A_JOB = 12e6  # about 4 s of one core
 MOST_CHUNKS = 64
 SHADOW_RAYS = 24  # a sample, of a few lights in view
-GATHER_RAYS = 0.2  # of a sample, an element of the coarse solution: roughly what a tolerance asks for with as many
+GATHER_RAYS = 0.1  # of a sample, an element of the coarse solution: roughly what a tolerance asks for with as many
 MOST_WARNINGS = 100  # told the report
 LONGEST = 8000  # characters of a slice in a command line, which holds 128 kB in all
 
@@ -96,7 +96,7 @@ def chosen_quality(bake):
 def n_chunks(settings, n_maps):
     """Number of jobs the surfaces are shared among: asked for, or by the rays the scene will need.
 
-    The tolerance counts by the number of elements alone, which changes in steps: within a step no sample is made again.
+    The tolerance does not count: a changed one must not sample again.
     """
     asked = settings["bake"]["chunks"]
     if asked != "auto":

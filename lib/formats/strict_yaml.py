@@ -61,7 +61,7 @@ def scalar(text):
     >>> scalar("1.5"), scalar("-3"), scalar("true"), scalar("oak"), scalar("~")
     ((1.5, None), (-3, None), (True, None), ('oak', None), (None, None))
     >>> scalar("1e-3")[1]
-    "'1e-3' is a number to some YAML readers and text to others; write 0.001, or quote it"
+    "'1e-3' is a number to some YAML readers and text to others; write 0.001"
     """
     if text in ("", "~", "null", "Null", "NULL"):
         return None, None
@@ -86,12 +86,12 @@ def scalar(text):
             return text, f"{shown(text)} is not a finite number"
         return (
             text,
-            f"{shown(text)} is a number to some YAML readers and text to others; write {_plain(text)}, or quote it",
+            f"{shown(text)} is a number to some YAML readers and text to others; write {_plain(text)}",
         )
     if _OTHER_BASE.fullmatch(text):
         return (
             text,
-            f"{shown(text)} is a different number to different YAML readers; write a plain decimal, or quote it",
+            f"{shown(text)} is a different number to different YAML readers; write a plain decimal",
         )
     return text, None
 

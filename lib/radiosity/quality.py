@@ -3,7 +3,7 @@
 Model: the relative RMS error of a map is the root of the sum of squares of
 
     gather         0.6 % (960 / K)^0.8
-    lookups        0.5 % (4000 / n_elements)^0.3
+    lookups        0.4 % (8000 / n_elements)^0.3
     direct light   0.5 % (64 / n1)^0.5
     interpolation  0.4 % (t / 0.025)
 
@@ -13,6 +13,8 @@ as measured against path traced references.
 from dataclasses import asdict, dataclass
 
 import numpy as np
+
+ELEMENTS = 8000  # enough for lookups at a tolerance of 0.004; finer bakes may ask for more by `elements`
 
 
 @dataclass(frozen=True)
@@ -40,15 +42,14 @@ class Quality:
 def quality(tolerance, max_level=8):
     """Quality for a relative RMS error `tolerance` (0.002 .. 0.1) with trees at most `max_level` deep.
 
-    The number of elements changes in steps, so that most changes of the tolerance leave the solved elements as they
-    are.
+    Elements, their rows and their first shadow rays are the same for every tolerance: a changed one leaves the solved
+    light as it is.
     """
     ratio = tolerance / 0.01
-    elements = 4000 if tolerance >= 0.0075 else 16000 if tolerance >= 0.004 else 40000
     rays = _multiple_of_16(gather_rays(960, ratio), 32, 4096)
     n1 = 32 if tolerance >= 0.015 else 64 if tolerance >= 0.0075 else 256
     return Quality(
-        n_elements=elements,
+        n_elements=ELEMENTS,
         rays_per_element=64,
         gather_rays=rays,
         shadow_rays=(16, n1),

@@ -242,7 +242,7 @@ def collect(name, bake, settings, run):
     scene, solution = bake.scene, bake.solution
     table = bake.budget or {"T": None, "S_before": None, "S_after": None, "surfaces": [], "profile": "standard"}
     exported_maps = getattr(bake.textures, "light" if table["profile"] == "lightmap" else "final", None)
-    mean_H = float(np.mean(solution.mean_H)) if solution is not None else 0.0
+    mean_H = float(np.max(solution.mean_H)) if solution is not None else 0.0  # as the thresholds have it
     D_i, ways = {s["surface"]: s["D"] for s in table["surfaces"]}, settings.get("reconstruction", {})
     rows = surfaces.rows(scene, bake.trees, bake.maps, exported_maps, D_i, mean_H, ways)
     for row, extent in zip(rows, bake.casters.extent, strict=True):

@@ -16,7 +16,7 @@ def rows(scene, trees, maps, textures, D_i, mean_H, reconstruction):
     maps : MapSet of the light at full size, or None
     textures : MapSet as exported, within the budget, or None
     D_i : {name: the paper's D_i of the map before the budget}
-    mean_H : mean irradiance of the scene, over channels [W/m^2]; errors are relative to it
+    mean_H : mean irradiance of the scene, largest channel [W/m^2]; errors are relative to it
     reconstruction : {surface name: "texture" or "gouraud"} of those that ask for one
     """
     place = [{int(s): k for k, s in enumerate(m.surface)} if m is not None else {} for m in (maps, textures)]

@@ -11,7 +11,6 @@ from lib.formats import strict_yaml
 from lib.formats.rule_settings import MOST_CHUNKS, n_chunks, rule_settings, short
 
 DEFAULTS = Path(__file__).parents[2] / "config" / "bake.yaml"
-QUALITY = {"sample", "shoot", "refine", "balance_resample"}
 
 
 def settings(**changed):
@@ -38,7 +37,7 @@ def settings(**changed):
         ({"up": "y"}, set()),  # of the geometry, which has its own slice
         ({"bake__chunks": 3}, set()),  # a param of its own
         ({"bake__tolerance": 0.012}, {"refine", "balance_resample"}),
-        ({"bake__tolerance": 0.003}, QUALITY),  # more elements
+        ({"bake__tolerance": 0.003}, {"refine", "balance_resample"}),
         ({"bake__relative_to": "surface"}, {"refine", "balance_resample"}),
         ({"bake__max_level": 4}, {"refine"}),
         ({"bake__bounces": 1}, {"sample", "shoot", "refine"}),
@@ -101,6 +100,6 @@ def test_chunks_follow_the_scene_and_not_the_tolerance():
     plain = settings()
     assert n_chunks(plain, 0) == n_chunks(plain, 1) == 1
     assert 1 < n_chunks(plain, 200) <= n_chunks(plain, 400) <= n_chunks(plain, 100_000) == MOST_CHUNKS
-    for tolerance in (0.009, 0.013, 0.02):  # one step of the number of elements
+    for tolerance in (0.002, 0.009, 0.013, 0.1):
         assert n_chunks(settings(bake__tolerance=tolerance), 200) == n_chunks(plain, 200)
     assert n_chunks(settings(bake__chunks=7), 1) == 7
