@@ -137,7 +137,8 @@ rule shoot:
         casters=rules.tessellate.output,
         samples=expand(rules.sample.output, c=CHUNKS),
     output:
-        f"{STAGE}/shoot/solution.npz",
+        solution=f"{STAGE}/shoot/solution.npz",
+        plot=f"{STAGE}/shoot/convergence.svg",
     log:
         text=f"{STAGE}/shoot/log.txt",
         cost=f"{STAGE}/shoot/cost.json",
@@ -147,7 +148,7 @@ rule shoot:
         materials=scene.slices["materials"],
     shell:
         "{PYTHON:q} -m stages.shoot --scene {input.scene:q} --casters {input.casters:q} --samples {input.samples:q}"
-        " --materials {params.materials:q} --settings {params.settings:q} --out {output:q}"
+        " --materials {params.materials:q} --settings {params.settings:q} --out {output.solution:q} --plot {output.plot:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
 
@@ -155,7 +156,7 @@ rule refine_direct:
     input:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
-        solution=rules.shoot.output,
+        solution=rules.shoot.output.solution,
         samples=rules.sample.output,
     output:
         f"{STAGE}/refine/direct_{{c}}.npz",
@@ -176,7 +177,7 @@ rule refine_indirect:
     input:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
-        solution=rules.shoot.output,
+        solution=rules.shoot.output.solution,
         direct=expand(rules.refine_direct.output, c=CHUNKS),
     output:
         f"{STAGE}/refine/indirect_{{c}}.npz",
@@ -196,7 +197,7 @@ rule refine_indirect:
 rule balance_resample:
     input:
         scene=rules.import_scene.output,
-        solution=rules.shoot.output,
+        solution=rules.shoot.output.solution,
         direct=rules.refine_direct.output,
         indirect=rules.refine_indirect.output,
     output:
@@ -305,7 +306,7 @@ rule report:
     input:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
-        solution=rules.shoot.output,
+        solution=rules.shoot.output.solution,
         direct=expand(rules.refine_direct.output, c=CHUNKS),
         indirect=expand(rules.refine_indirect.output, c=CHUNKS),
         maps=expand(rules.balance_resample.output, c=CHUNKS),

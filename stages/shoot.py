@@ -3,6 +3,7 @@ ray.
 
 reads   scene.npz, casters.npz, chunk_<c>.npz of sample, the reflectances        (lib.formats.scene, .casters, .samples)
 writes  solution.npz                                                             (lib.formats.solution)
+        convergence.svg: the share of unshot power over the number of shots      (lib.report.charts)
 
 settings: n_elements, convergence, bounces ("converge" or n)
 """
@@ -14,6 +15,7 @@ from lib.elements.grids import POINTS, element_grids
 from lib.formats import artefact, casters, samples, scene, solution
 from lib.radiosity.shooting import DoesNotConverge, FormFactors, solve
 from lib.refusal import Refusal
+from lib.report import charts
 
 ABSORBED = -2  # of lib.radiosity.rows, which casts rays and is not loaded here
 
@@ -22,6 +24,7 @@ def arguments(parser):
     """Name the stage's files and settings."""
     for name in ("scene", "casters", "materials", "out"):
         parser.add_argument(f"--{name}", required=True, metavar="FILE")
+    parser.add_argument("--plot", metavar="FILE", help="SVG: unshot power over shots")
     parser.add_argument("--samples", nargs="+", required=True, metavar="FILE")
     parser.add_argument("--settings", type=door.json_text, required=True, metavar="JSON")
 
@@ -73,6 +76,11 @@ def body(args, cost):
             facts,
         ),
     )
+
+    if args.plot:
+        shots, unshot = found.history.T if len(found.history) else ([], [])
+        with artefact.atomic(args.plot) as file:
+            file.write(charts.standalone(charts.convergence(shots, unshot, chosen["convergence"])).encode())
 
 
 def collected(chunks, total, groups):

@@ -63,6 +63,20 @@ def convergence(shots, unshot, target=None):
     return "".join(parts)
 
 
+STYLE = (
+    "<style>svg{background:#fff;font:12px sans-serif}.grid{stroke:#ddd}.tick{fill:#555}.curve{fill:none;stroke:#2468b0;"
+    "stroke-width:2}.dot{fill:#2468b0}.target{stroke:#b04a24;stroke-dasharray:4}text.target{fill:#b04a24;stroke:none}"
+    "</style>"
+)
+
+
+def standalone(svg):
+    """A chart as a file of its own: with its name space and light colours; an empty drawing for ""."""
+    svg = svg or '<svg viewBox="0 0 1 1"></svg>'
+    head, body = svg.split(">", 1)
+    return f'{head} xmlns="http://www.w3.org/2000/svg">{STYLE}{body}\n'
+
+
 def _power(power):
     names = {0: "100 %", -1: "10 %", -2: "1 %", -3: "0.1 %", -4: "0.01 %"}
     return names.get(power, f"10<tspan dy='-5' font-size='9'>{power}</tspan>")

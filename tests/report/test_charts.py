@@ -5,7 +5,7 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
-from lib.report.charts import convergence, tree_lines
+from lib.report.charts import convergence, standalone, tree_lines
 
 
 def test_tree_with_one_divided_corner():
@@ -53,3 +53,9 @@ def test_convergence_is_an_svg_with_a_point_a_round():
 @pytest.mark.parametrize("shots, unshot", [([], []), ([0], [1.0]), ([0, 1], [0.0, 0.0])])
 def test_nothing_to_draw(shots, unshot):
     assert convergence(shots, unshot) == ""
+
+
+def test_a_chart_of_its_own_is_a_whole_svg_file():
+    whole = ET.fromstring(standalone(convergence([0, 5, 9], [1.0, 0.1, 0.001], 1e-3)))
+    assert whole.tag == "{http://www.w3.org/2000/svg}svg" and len(whole.findall(".//{*}circle")) == 3
+    assert ET.fromstring(standalone("")).tag.endswith("svg")

@@ -142,3 +142,12 @@ def test_arrays_of_other_names_are_refused(tmp_path, capsys):
     artefact.write(path, "samples", 2, header, arrays)
     assert bake.shoot() == 1
     assert path in capsys.readouterr().err
+
+
+def test_the_plot_draws_the_history(tmp_path):
+    bake = sampled(tmp_path, lit_room())
+    files = ["--casters", bake.path("casters"), "--materials", str(tmp_path / "materials.json")]
+    files += ["--samples", bake.path("samples", 0), "--out", bake.path("solution")]
+    assert bake.run(shoot, "shoot", *files, log=["--plot", str(tmp_path / "convergence.svg")]) == 0
+    rounds = len(solution.load(bake.path("solution")).history)
+    assert rounds > 2 and (tmp_path / "convergence.svg").read_text().count("<circle") == rounds
