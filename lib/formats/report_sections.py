@@ -275,16 +275,16 @@ def seams(figures):
         ("surface", "t", lambda r: escape(str(r["a"]))),
         ("neighbour", "t", lambda r: escape(str(r["b"]))),
         ("largest step [W/m\u00b2]", "n", lambda r: number(r["worst"])),
-        ("of mean light", "n", lambda r: share(r["relative"])),
+        ("of the light there", "n", lambda r: share(r["relative"])),
         ("RMS step [W/m\u00b2]", "n", lambda r: number(r["rms"])),
     ]
     note = (
         "Borders that two surfaces share smoothly, worst first: the largest difference of irradiance between their "
-        "maps along the border."
+        "maps along the border, also over the brightest light there or the scene's mean, whichever is more."
     )
     after = "".join(
         f"<p>In the exported textures, within the budget, the largest step is {number(r['worst'])} W/m\u00b2 "
-        f"({share(r['relative'])} of the mean light), between {escape(r['a'])} and {escape(r['b'])}.</p>"
+        f"({share(r['relative'])} of the light there), between {escape(r['a'])} and {escape(r['b'])}.</p>"
         for r in figures["seams_exported"][:1]
     )
     return section("Seams", table(columns, figures["seams"]) + after, note, "seams")

@@ -66,6 +66,7 @@ def exported_irradiance(maps, rho_avg, textured):
 def rows(scene, casters, maps, mean_H):
     """Steps of irradiance along borders that are smooth in space, the worst first: dicts a, b, worst, rms, relative.
 
+    relative : worst over the brightest light on the border, or over the scene's mean mean_H where that is more
     maps : MapSet of H (N, G, 3), or None; borders between surfaces without maps are left out
     """
     if maps is None:
@@ -78,17 +79,18 @@ def rows(scene, casters, maps, mean_H):
         if None not in pair:
             worst, rms = step(*pair, is_reversed)
             if np.isfinite(worst):
-                steps.append((-worst, rms, a, side_a, b, side_b, bool(is_reversed)))
+                light = max(mean_H, *(float(value[~hidden].max(initial=0.0)) for value, hidden in pair))
+                steps.append((-worst, rms, light, a, side_a, b, side_b, bool(is_reversed)))
     # Ask from the worst down which borders are smooth: normals cost more than steps, and few are listed.
     listed = []
-    for negative, rms, a, side_a, b, side_b, is_reversed in sorted(steps):
+    for negative, rms, light, a, side_a, b, side_b, is_reversed in sorted(steps):
         N = [
             normal(scene.surfaces[s], *border_uv(side, turned)) * (-1 if scene.flip[s] else 1)
             for s, side, turned in ((a, side_a, False), (b, side_b, is_reversed))
         ]
         if is_smooth(*N):
             row = {"a": scene.names[a], "b": scene.names[b], "worst": -negative, "rms": rms}
-            listed.append({**row, "relative": -negative / mean_H if mean_H > 0 else None})
+            listed.append({**row, "relative": -negative / light if light > 0 else None})
         if len(listed) == MOST:
             break
     return listed
