@@ -47,6 +47,7 @@ def loglog(title, x_label, y_label, curves, marks=()):
     )
     turned = f'transform="translate(16 {(TOP + HEIGHT - FOOT) / 2}) rotate(-90)"'
     parts.append(f'<text {turned} text-anchor="middle">{escape(y_label)}</text>')
+    key = WIDTH - RIGHT - 34 - 6.6 * max((len(name) for name, _ in curves), default=0)  # of 12 pixel letters
     for number, (name, line) in enumerate(curves):
         colour, dashed = COLOURS[number % len(COLOURS)], name.endswith(" fit")
         path = " ".join(f"{x:.1f},{y:.1f}" for x, y in (at(*p) for p in line))
@@ -54,12 +55,10 @@ def loglog(title, x_label, y_label, curves, marks=()):
         parts.append(f'<polyline points="{path}" fill="none" stroke="{colour}" stroke-width="1.8"{dash}/>')
         for p in () if dashed else line:
             x, y = at(*p)
-            parts.append(
-                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.2" fill="{colour}"/>'
-            )
+            parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="3.2" fill="{colour}"/>')
         y = TOP + 14 + 17 * number
-        parts.append(f'<path d="M{WIDTH - 190} {y - 4}h22" stroke="{colour}" stroke-width="2.5"{dash}/>')
-        parts.append(f'<text x="{WIDTH - 162}" y="{y}">{escape(name)}</text>')
+        parts.append(f'<path d="M{key:.0f} {y - 4}h22" stroke="{colour}" stroke-width="2.5"{dash}/>')
+        parts.append(f'<text x="{key + 28:.0f}" y="{y}">{escape(name)}</text>')
     for x, y, text in marks:
         x, y = at(x, y)
         parts.append(f'<circle cx="{x:.1f}" cy="{y:.1f}" r="5" fill="none" stroke="#333"/>')
