@@ -60,7 +60,9 @@ def spheres(bench):
         share = {k: np.diff(np.sin(np.radians(ZONES[k][:2])))[0] / 2 for k in zones}
         power = sum(share[k] * ZONES[k][2] for k in zones)
         H = power / (1 - sum(share[k] * ZONES[k][3] for k in zones))
-        maps = bench.maps(surfaces, {k: ZONES[k][3] for k in zones}, cheap=STANDARD | {"max_level": 4, "elements": 1000})
+        maps = bench.maps(
+            surfaces, {k: ZONES[k][3] for k in zones}, cheap=STANDARD | {"max_level": 4, "elements": 1000}
+        )
         values = np.concatenate([m[0].ravel() for m in maps.values()])
         yield Figure(f"hollow sphere of uneven E and ρ, {name}, RMSE", "H = Σ E A / (A - Σ ρ A)", 0.01, rms(values, H))
         yield Figure(f"hollow sphere of uneven E and ρ, {name}, worst texel", "the same", 0.05, worst(values, H))
