@@ -110,8 +110,8 @@ def scene(geometry, bake_settings, lamp=40.0):
 
 
 def dim(n):
-    """All lamps but the first two a thousandth as bright."""
-    return {f"lamp {k}": 0.04 for k in range(2, n)}
+    """All lamps but the first two a millionth as bright."""
+    return {f"lamp {k}": 4e-5 for k in range(2, n)}
 
 
 AXES = {  # name: (what it counts, sizes, scene of a size)
@@ -126,7 +126,7 @@ AXES = {  # name: (what it counts, sizes, scene of a size)
     ),
     "triangles": (
         "triangles that cast shadows",
-        (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 3e-5),
+        (1e-3, 3e-4, 1e-4, 3e-5, 1e-5),
         lambda sag: scene(room() + lamps(2) + balls(4), {**QUICK, "sag": sag}),
     ),
     "lights": (

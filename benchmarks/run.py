@@ -34,7 +34,10 @@ import speed_report  # noqa: E402
 ROOT = HERE.parent
 SCENES = ("cornell", "room")
 TOLERANCES = (0.04, 0.02, 0.014, 0.01, 0.007, 0.004, 0.002)
-CYCLES = {name: ((100_000, 16), (200_000, 32), (300_000, 96)) for name in SCENES}  # texels, paths a texel
+CYCLES = {  # texels, paths a texel
+    "cornell": ((100_000, 16), (200_000, 32), (300_000, 96)),
+    "room": ((200_000, 16), (600_000, 16), (1_000_000, 24)),
+}
 OTHER_GRIDS = (
     1.0,
     1.06,

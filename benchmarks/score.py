@@ -34,20 +34,23 @@ def bilinear(texels, s, t):
     return low * (1 - b) + high * b
 
 
+def front(curve):
+    """The rows of a curve [(cpu, error), ...] that no other beats in both, by rising cpu."""
+    best, kept = np.inf, []
+    for cpu, error in sorted(curve):
+        if error < best:
+            best = error
+            kept.append((cpu, error))
+    return kept
+
+
 def cpu_at(curve, rmse):
     """CPU seconds at which a curve [(cpu, rmse), ...] reaches an error, straight lines in logarithms; None outside it.
-
-    Only rows that no other row beats in both count.
 
     >>> round(cpu_at([(1, 0.04), (4, 0.01), (5, 0.02)], 0.02), 6)
     2.0
     """
-    best, front = np.inf, []
-    for cpu, error in sorted(curve):
-        if error < best:
-            best = error
-            front.append((cpu, error))
-    cpus, found = (np.log(column) for column in zip(*front, strict=True))
+    cpus, found = (np.log(column) for column in zip(*front(curve), strict=True))
     if not found[-1] <= np.log(rmse) <= found[0]:
         return None
     return float(np.exp(np.interp(-np.log(rmse), -found, cpus)))
