@@ -14,7 +14,7 @@ STAGES = sorted((ROOT / "stages").glob("*.py"))
 TESTS = sorted((ROOT / "tests").rglob("*.py"))
 MODULES = [path for path in LIB + STAGES if path.name != "__init__.py"]
 
-TOPICS = ("nurbs", "elements", "visibility", "radiosity", "maps", "lod", "report")  # arrays in, arrays out
+TOPICS = ("nurbs", "surfaces", "elements", "visibility", "radiosity", "maps", "lod", "report")  # arrays in, arrays out
 FREE = {"numpy", "scipy"}
 OWNERS = {  # the one importer of each other library: start-up cost per job, and one place to change
     "geomdl": ("lib/nurbs/model.py",),
@@ -25,8 +25,10 @@ OWNERS = {  # the one importer of each other library: start-up cost per job, and
     "pygltflib": ("lib/formats/gltf.py",),
     "jsonschema": ("lib/formats/scene_schema.py",),
     "yaml": ("lib/formats/strict_yaml.py",),
-    "fast_simplification": ("lib/lod/",),
-    "xatlas": ("lib/lod/",),
+    "pythoncdt": ("lib/surfaces/trim_mesh.py",),
+    "OCP": ("lib/formats/step_faces.py",),
+    "fast_simplification": ("lib/lod/mesh_levels.py",),
+    "xatlas": ("lib/surfaces/charts.py",),
 }
 DRAWERS = {"util", "utils", "helper", "helpers", "common", "misc", "tools", "shared", "base"}
 MAX_LINES = 400

@@ -24,7 +24,7 @@ EXTRAS = {name: [Requirement(text) for text in texts] for name, texts in PROJECT
 PINS = {canonicalize_name(name): version for name, version in re.findall(r"^([\w.-]+)==(\S+)", LOCK, re.MULTILINE)}
 IMPORT_NAMES = {"open3d-cpu": "open3d", "pyyaml": "yaml", "openimageio": "OpenImageIO"}  # others: - is _
 COMMANDS = {"snakemake", "pytest"}  # run rather than imported
-NOT_YET = {"fast-simplification", "xatlas"}  # for meshes; the README says so
+NOT_YET = {"fast-simplification", "xatlas", "pythoncdt"}  # for meshes; the README says so
 
 needs_make = pytest.mark.skipif(not shutil.which("make"), reason="no make here")
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from lib.formats import names
 from lib.formats.mistakes import Mistakes
 from lib.nurbs.surface import NurbsSurface
+from lib.surfaces.mesh import Mesh
+from lib.surfaces.trimmed import TrimmedSurface
 
 MAX_PATCHES = 100_000
 
@@ -14,15 +16,19 @@ class Patch:
     """One surface of a file.
 
     number : from 1, its place in the file
-    surface : NurbsSurface in the file's unit and axes
+    surface : NurbsSurface, TrimmedSurface or Mesh (without charts) in the file's unit and axes
     flip : the lit side is against S_u x S_v
     labels : texts that the entry's `only` may match (layer, object name, number)
+    material : key of GeometryFile.materials, or None
+    solid : part of a closed body (True), of an open sheet (False), or nobody said (None)
     """
 
     number: int
-    surface: NurbsSurface
+    surface: NurbsSurface | TrimmedSurface | Mesh
     flip: bool = False
     labels: tuple = ()
+    material: str | None = None
+    solid: bool | None = None
 
 
 @dataclass(frozen=True)
@@ -33,6 +39,9 @@ class GeometryFile:
     metres : length of the file's unit [m], None if the file states none
     notes : one sentence per kind of thing that was skipped
     trimmed : numbers of the trimmed surfaces that were skipped
+    materials : {name: as under `materials` of scene.yaml}; a texture is a path relative to the file's folder, or
+        "embedded:KEY"
+    pictures : {KEY: bytes} of embedded pictures
     """
 
     patches: list
@@ -40,6 +49,8 @@ class GeometryFile:
     metres: float | None = None
     notes: list = field(default_factory=list)
     trimmed: list = field(default_factory=list)
+    materials: dict = field(default_factory=dict)
+    pictures: dict = field(default_factory=dict)
 
 
 @dataclass
