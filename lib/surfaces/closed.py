@@ -1,0 +1,31 @@
+"""Which triangles of a mesh belong to a closed shell."""
+
+import numpy as np
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+
+def in_closed_shell(V, F):
+    """(n_f,) bool: the face is part of a closed shell.
+
+    V (n_v, 3), F (n_f, 3): positions equal bit for bit are one vertex (0.0 and -0.0 are equal).  Faces that share an
+    edge are of one component; a component is closed when each of its edges is used exactly once in each direction.
+    """
+    V, F = np.asarray(V, dtype=np.float64) + 0.0, np.asarray(F, dtype=np.int64)
+    if not len(F):
+        return np.zeros(0, dtype=bool)
+    _, place = np.unique(np.ascontiguousarray(V).view("V24").ravel(), return_inverse=True)
+    ends = place[F]
+    a, b = ends.ravel(), np.roll(ends, -1, axis=1).ravel()
+    face = np.repeat(np.arange(len(F)), 3)
+    key = np.minimum(a, b) * len(V) + np.maximum(a, b)
+    _, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
+    turns = np.bincount(edge, weights=np.sign(b - a), minlength=len(uses))
+    is_sound = (uses == 2) & (turns == 0)
+    # faces and edges are the nodes; an edge joins all faces that use it
+    size = len(F) + len(uses)
+    graph = coo_array((np.ones(len(edge), dtype=np.int8), (face, len(F) + edge)), shape=(size, size))
+    group = connected_components(graph, directed=False)[1]
+    is_open = np.zeros(group.max() + 1, dtype=bool)
+    is_open[group[len(F) :][~is_sound]] = True
+    return ~is_open[group[: len(F)]]
