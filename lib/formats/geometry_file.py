@@ -1,4 +1,4 @@
-"""One geometry file, of any kind that is read, as NURBS patches in the file's own unit."""
+"""One geometry file, of any kind that is read, as surfaces in the file's own unit."""
 
 import hashlib
 from pathlib import Path
@@ -9,29 +9,45 @@ from lib.refusal import refusal
 
 MAX_BYTES = 512 << 20
 MAX_TEXT = 48 << 20  # text takes some ten times its size in memory while it is read
-KINDS = {".bpt": "Bezier patches", ".txt": "Bezier patches (teaset)", ".json": "geomdl JSON", ".3dm": "Rhino"}
+MAX_MESH_TEXT = 192 << 20  # an OBJ takes some twelve times its size
+KINDS = {
+    ".bpt": "Bezier patches", ".txt": "Bezier patches (teaset)", ".json": "geomdl JSON", ".3dm": "Rhino",
+    ".obj": "Wavefront", ".glb": "glTF", ".gltf": "glTF",
+}  # fmt: skip
+PACKED = (".zip", ".gz", ".7z", ".rar", ".tar", ".tgz", ".bz2", ".xz", ".zst")
 
 
 def read(path, file, name, only=None, trimmed="refuse"):
     """Read the geometry file at `path` as a GeometryFile.
 
     file, name : the path and the entry's name as the user wrote them, for messages
-    only : pattern of layers, object names or patch numbers, or None
+    only : pattern of layers, groups, objects, materials or patch numbers, or None
     trimmed : "refuse" or "skip" faces with trims
 
     Raises Refusal, listing every mistake found in the file.
     """
     path = Path(path)
     kind = path.suffix.lower()
+    if kind in PACKED:
+        raise refusal(f"is packed ({kind}): unpack it and name the file inside", file, name, "file")
     if kind not in KINDS:
         allowed = ", ".join(f"{suffix} ({what})" for suffix, what in KINDS.items())
         raise refusal(f"files of kind '{kind}' are not read; allowed: {allowed}", file, name, "file")
-    data = read_bytes(path, file, name, MAX_BYTES if kind == ".3dm" else MAX_TEXT)
+    most = {".3dm": MAX_BYTES, ".glb": MAX_BYTES, ".gltf": MAX_BYTES, ".obj": MAX_MESH_TEXT}.get(kind, MAX_TEXT)
+    data = read_bytes(path, file, name, most)
     report = Report(Mistakes(), file, name)
     if kind == ".3dm":
         from lib.formats import threedm
 
         content = threedm.read(data, report, only, trimmed)
+    elif kind == ".obj":
+        from lib.formats import obj
+
+        content = obj.read(data, report, only, path.parent)
+    elif kind in (".glb", ".gltf"):
+        from lib.formats import gltf_mesh
+
+        content = gltf_mesh.read(data, report, only, path.parent)
     elif kind == ".json":
         from lib.formats import geomdl_json
 

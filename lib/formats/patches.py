@@ -21,6 +21,7 @@ class Patch:
     labels : texts that the entry's `only` may match (layer, object name, number)
     material : key of GeometryFile.materials, or None
     solid : part of a closed body (True), of an open sheet (False), or nobody said (None)
+    shape : surfaces with the same text are one mesh moved about: the same triangles and corners in the same order
     """
 
     number: int
@@ -29,6 +30,7 @@ class Patch:
     labels: tuple = ()
     material: str | None = None
     solid: bool | None = None
+    shape: str | None = None
 
 
 @dataclass(frozen=True)
@@ -42,6 +44,7 @@ class GeometryFile:
     materials : {name: as under `materials` of scene.yaml}; a texture is a path relative to the file's folder, or
         "embedded:KEY"
     pictures : {KEY: bytes} of embedded pictures
+    up : axis that points up in the file ("y", "z"), None if the format states none
     """
 
     patches: list
@@ -51,6 +54,7 @@ class GeometryFile:
     trimmed: list = field(default_factory=list)
     materials: dict = field(default_factory=dict)
     pictures: dict = field(default_factory=dict)
+    up: str | None = None
 
 
 @dataclass
