@@ -20,21 +20,6 @@ from lib.surfaces.polygons import triangles
 ARRAYS = ("v", "vt", "vn", "f")
 SILENT = ("s", "l", "p", "lod", "bevel", "c_interp", "d_interp", "shadow_obj", "trace_obj", "usemap", "maplib", "mg")
 FREE_FORM = tuple("curv curv2 surf vp cstype deg bmat step parm trim hole scrv sp end".split())
-    "curv",
-    "curv2",
-    "surf",
-    "vp",
-    "cstype",
-    "deg",
-    "bmat",
-    "step",
-    "parm",
-    "trim",
-    "hole",
-    "scrv",
-    "sp",
-    "end",
-)
 MOST_LABELS = 1000
 
 
@@ -165,7 +150,8 @@ def _absolute(index, lines, line_of_corner, all_lines, word):
         if bad.any():
             k = int(np.argmax(bad))
             known = f"1 to {len(lines)}" if len(lines) else f"there is no `{word}`"
-            raise BadLine(int(all_lines.number[line_of_corner[k]]), f"`{word}` {index[k]} is not there; allowed: {known}")
+            line = int(all_lines.number[line_of_corner[k]])
+            raise BadLine(line, f"`{word}` {index[k]} is not there; allowed: {known}")
         return found
     return np.full(len(index), -1, dtype=np.int64)
 
