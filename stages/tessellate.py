@@ -15,6 +15,7 @@ from lib import door
 from lib.formats import casters, scene
 from lib.nurbs import tessellate
 from lib.refusal import refusal
+from lib.surfaces.closed import in_closed_shell
 
 SAG, OWN_SAG = 1e-3, 2e-3  # of the frame; of the surface's own size
 
@@ -62,6 +63,7 @@ def make(surfaces, flip, role, sag):
         UV=mesh.UV,
         F=F[keep],
         face_surface=face_surface[keep],
+        face_shell=(known.shell >= 0)[face_surface[keep]] | in_closed_shell(mesh.V, F[keep]),
         area=known.area,
         extent=known.extent,
         sag=np.where(known.is_planar, 0.0, mesh.distance),

@@ -36,6 +36,7 @@ def scene_of(surfaces):
         names=names,
         files=[f"{k:03d}-surface" for k in range(n)],
         surfaces=[surfaces[name][0] for name in names],
+        front=np.full(n, -1, dtype=np.int32),
         flip=np.array([f.get("flip", False) for f in facts]),
         role=[f.get("role", "full") for f in facts],
         E=np.array([np.broadcast_to(f.get("E", 0.0), 3) for f in facts], dtype=np.float64),

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lib.nurbs.evaluate import evaluate, frame, frame_grid
+from lib.nurbs.evaluate import frame, frame_grid
+from lib.surfaces import frames
 
 MOST_ROOTS = 8
 INSIDE = 0.002  # border samples are evaluated this far inside: on an edge shared by walls half the hemisphere is wall
@@ -59,6 +60,14 @@ class Lattice:
             array[copy] = array[source]
         return array
 
+    def share_own(self, flags):
+        """Crossings that repeat each other are flagged (h, w) together, in place, if one of them is; returns flags."""
+        if self._repeats:
+            copy, source = self._copies(flags.shape)
+            np.logical_or.at(flags, source, flags[copy])
+            flags[copy] = flags[source]
+        return flags
+
     @property
     def _repeats(self):
         return any(self.closed) or any(self.collapsed)
@@ -80,23 +89,29 @@ class Lattice:
         return copy, np.divmod(source[copy], shape[1])
 
 
-def receivers(surface, flip, lift, lattice, level, j, i):
+def receivers(surface, flip, lift, lattice, level, j, i, domain=None):
     """Ray origins and normals of lattice crossings.
 
     j, i (m,) crossings of `level`.  lift: distance between the surface and its mesh, OFFSET is added.
+    domain : Domain of a surface that does not fill its map: crossings outside are taken at the nearest place inside.
     Returns x (m, 3) float64 lifted off along N, N (m, 3) float64 unit, on the side that receives.
     """
     h, w = lattice.shape(level)
     j, i = np.asarray(j), np.asarray(i)
     u, v, pole = _parameters(lattice, j, i, h, w)
-    if len(j) * 4 >= h * w and not any(lattice.collapsed):
+    nurbs = frames.whole(surface)
+    if domain is not None:
+        places = domain.locate(np.stack([u, v], axis=1))
+        pole &= places.is_inside
+        S, N = frames.frame(surface, places.uv, places.face)
+    elif len(j) * 4 >= h * w and not any(lattice.collapsed):
         # Most of the lattice: evaluate it as a tensor grid.
-        S, N = _grid(surface, lattice, h, w)
+        S, N = _grid(nurbs, lattice, h, w)
         S, N = S[j, i], N[j, i]
     else:
-        S, N = frame(surface, u, v)
+        S, N = frame(nurbs, u, v)
     for k in np.flatnonzero(pole):
-        N[k] = _pole_normal(surface, lattice, u[k], v[k])
+        N[k] = _pole_normal(nurbs, lattice, u[k], v[k])
     N = -N if flip else N
     return S + N * (lift + OFFSET), N
 
@@ -135,9 +150,3 @@ def _pole_normal(surface, lattice, u, v):
     N = frame(surface, around_u, around_v)[1].sum(axis=0)
     length = np.linalg.norm(N)
     return N / length if length > 1e-6 else frame(surface, np.array([u]), np.array([v]))[1][0]
-
-
-def area_density(surface, u, v):
-    """|S_u x S_v| at parameters u, v (m,): (m,)."""
-    _, S_u, S_v = evaluate(surface, u, v)
-    return np.linalg.norm(np.cross(S_u, S_v), axis=1)

@@ -30,10 +30,14 @@ class Quadtree:
     none,
         reach (h, w) float32 free space above it in the scene's frame, inf where nobody asked
     divided : list of (n_v 2^l, n_u 2^l) bool for l < level
+
+    cover(level) -> (needed, straddling) cells of a level (n_v 2^l, n_u 2^l) bool, where the surface does not fill its
+    map: only needed cells are divided; those that straddle two charts always, down to `finest`, the tree's own top.
     """
 
-    def __init__(self, lattice, base, channels, side=1.0):
+    def __init__(self, lattice, base, channels, side=1.0, cover=None, finest=None):
         self.lattice, self.base, self.level, self.side = lattice, base, base, side
+        self._cover, self._finest = cover, finest
         shape = lattice.shape(base)
         self.value = np.zeros((*shape, channels), dtype=np.float32)
         self.noise = np.zeros(shape, dtype=np.float32)
@@ -86,15 +90,18 @@ class Quadtree:
         """Divide leaves above the threshold tau, up to level `top`; balance.  Returns True when new samples are
         wanted.
         """
+        top = top if self._finest is None else self._finest
         divided = [
             *self.divided,
             *(np.zeros(self.lattice.cells(self.level), dtype=bool) for _ in range(self.level < top)),
         ]
         for level in range(self.base, len(divided)):
             cell = self.side * 2.0**-level
+            needed, straddling = self._cover(level) if self._cover else (True, False)
             if cell > SMALLEST_CELL:
                 slack = max(1.0, (FULL_CELL / cell) ** SLACK)
-                divided[level] |= self._exceeds(level, tau * slack) & self._exists(level)
+                divided[level] |= self._exceeds(level, tau * slack) & self._exists(level) & needed
+            divided[level] |= straddling & self._exists(level)
         divided = balance(divided, self.lattice.closed)
         if not any((new & ~old).any() for new, old in zip(divided, self._padded(divided), strict=True)):
             return False
@@ -115,12 +122,21 @@ class Quadtree:
         return children(self.divided[level - 1]) if level else np.ones(self.lattice.cells(0), dtype=bool)
 
     def _exceeds(self, level, tau):
-        exceeds = self.contrast(level) > tau if level == self.base else children(self.residual(level - 1) > tau)
+        exceeds = self.contrast(level) > tau if level == self.base else self._departs(level - 1, tau)
         if level < self.base + WIDE_LEVELS:
             exceeds |= self._is_wide(level)
         if self.side * 2.0**-level > CONTACT_CELL:
             exceeds |= self._is_contact(level)
         return exceeds
+
+    def _departs(self, level, tau):
+        """Children of cells of a level whose midpoints depart from prediction; of a cell that held two charts, those
+        with contrast of their own."""
+        departs = self.residual(level) > tau
+        if not self._cover or not self._cover(level)[1].any():
+            return children(departs)
+        straddles = self._cover(level)[1]
+        return children(departs & ~straddles) | (children(straddles) & (self.contrast(level + 1) > tau))
 
     def _is_contact(self, level):
         """Cells with hidden and visible corners: along the line where another object touches, (rows, columns)."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from lib.formats import artefact
 
-KIND, VERSION = "casters", 1
+KIND, VERSION = "casters", 2
 
 
 @dataclass(frozen=True)
@@ -17,9 +17,10 @@ class Casters:
     V (n_v, 3) float64, UV (n_v, 2) float64 surface parameters in [0, 1]
     F (n_f, 3) int32    triangles with an area, wound so that their geometric normal is the surface's lit side
     face_surface (n_f,) int32 ascending; surfaces that do not block (receive_only) have no faces
+    face_shell (n_f,) bool   faces of closed shells, of whatever kind
     area (n,), extent (n, 2) mean length along u, v; sag (n,) largest distance from the mesh, 0 on planar surfaces
     is_planar (n,), is_closed (n, 2) in u, v; is_collapsed (n, 4) sides u=0, u=1, v=0, v=1; all bool
-    shell (n,) int32    closed shell the surface belongs to, or -1
+    shell (n,) int32    closed shell of whole NURBS surfaces it belongs to, or -1
     borders (m, 5) int32 [surface a, side a, surface b, side b, reversed]: sides that are the same curve at the same
     speed
     """
@@ -30,6 +31,7 @@ class Casters:
     UV: np.ndarray
     F: np.ndarray
     face_surface: np.ndarray
+    face_shell: np.ndarray
     area: np.ndarray
     extent: np.ndarray
     sag: np.ndarray
@@ -48,6 +50,7 @@ def _expected(x):
         "UV": ((n_v, 2), np.float64),
         "F": ((n_f, 3), np.int32),
         "face_surface": ((n_f,), np.int32),
+        "face_shell": ((n_f,), np.bool_),
         "area": ((n,), np.float64),
         "extent": ((n, 2), np.float64),
         "sag": ((n,), np.float64),

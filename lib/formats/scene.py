@@ -8,11 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lib.formats import artefact
+from lib.formats import artefact, surface_arrays
 from lib.formats.artefact import ArtefactError
-from lib.nurbs.surface import NurbsSurface
 
-KIND, VERSION = "scene", 2
+KIND, VERSION = "scene", 3
 ROLES = ("full", "cast_only", "receive_only")
 
 
@@ -22,7 +21,8 @@ class Scene:
 
     names : n different texts, ascending
     files : n file stems, safe in any file system, e.g. "003-teapot-12"
-    surfaces : n NurbsSurface, world metres
+    surfaces : n NurbsSurface, TrimmedSurface or Mesh with charts, world metres
+    front : (n,) int32, the surface whose back this is, with the same geometry and the other side lit; -1 otherwise
     flip : (n,) bool, the lit side is against S_u x S_v
     role : n of ROLES;  material : n texts
     E : (n, 3) float64 exitance, linear RGB [W/m^2], >= 0
@@ -35,6 +35,7 @@ class Scene:
     names: list
     files: list
     surfaces: list
+    front: np.ndarray
     flip: np.ndarray
     role: list
     E: np.ndarray
@@ -60,6 +61,7 @@ def check(scene, where="scene"):
     demand(len(set(scene.files)) == n, "files", "different file stems")
     demand(set(scene.role) <= set(ROLES), "role", " | ".join(ROLES))
     for field, shape, dtype in (
+        ("front", (n,), np.int32),
         ("flip", (n,), bool),
         ("E", (n, 3), np.float64),
         ("group", (n,), np.int32),
@@ -67,6 +69,8 @@ def check(scene, where="scene"):
     ):
         array = getattr(scene, field)
         demand(array.shape == shape and array.dtype == dtype, field, f"{np.dtype(dtype).name} of shape {shape}")
+    is_front = scene.front < 0
+    demand(scene.front.max() < n and is_front[scene.front[~is_front]].all(), "front", "-1 or a surface that is no back")
     demand(np.isfinite(scene.E).all() and (scene.E >= 0).all(), "E", "finite values >= 0")
     n_groups = len(scene.groups)
     demand(n_groups > 0 and 0 <= scene.group.min() and scene.group.max() < n_groups, "group", f"0 to {n_groups - 1}")
@@ -76,7 +80,6 @@ def check(scene, where="scene"):
 def save(path, scene):
     """Write a Scene; the bytes depend on its content alone."""
     check(scene, path)
-    S = scene.surfaces
     header = {
         "names": list(scene.names),
         "files": list(scene.files),
@@ -86,13 +89,8 @@ def save(path, scene):
         "up": scene.up,
         "warnings": list(scene.warnings),
     }
-    arrays = {
-        "degree": np.array([(s.degree_u, s.degree_v) for s in S], dtype=np.int32),
-        "size": np.array([s.Pw.shape[:2] for s in S], dtype=np.int32),
-        "knots": np.concatenate([knots for s in S for knots in (s.knots_u, s.knots_v)]),
-        "Pw": np.concatenate([s.Pw.reshape(-1, 4) for s in S]),
-        **{field: getattr(scene, field) for field in ("flip", "E", "group", "is_black")},
-    }
+    arrays = surface_arrays.packed(scene.surfaces, scene.front)
+    arrays |= {field: getattr(scene, field) for field in ("front", "flip", "E", "group", "is_black")}
     artefact.write(path, KIND, VERSION, header, arrays)
 
 
@@ -100,21 +98,10 @@ def load(path):
     """Read a Scene; ArtefactError if the file is not one."""
     header, arrays = artefact.read(path, KIND, VERSION)
     try:
-        surfaces = _surfaces(arrays.pop("degree"), arrays.pop("size"), arrays.pop("knots"), arrays.pop("Pw"))
+        surfaces = surface_arrays.unpacked({k: arrays.pop(k) for k in surface_arrays.NAMES}, arrays["front"])
         fields = ("names", "files", "role", "groups", "material", "up", "warnings")
         scene = Scene(surfaces=surfaces, **{field: header[field] for field in fields}, **arrays)
-    except (KeyError, TypeError, ValueError) as error:
+    except (KeyError, TypeError, ValueError, IndexError, StopIteration) as error:
         raise ArtefactError(f"{path}: damaged ({error}); delete it to have it made again") from error
     check(scene, path)
     return scene
-
-
-def _surfaces(degree, size, knots, Pw):
-    """Cut the packed knots and control points into surfaces."""
-    surfaces, k, p = [], 0, 0
-    for (degree_u, degree_v), (n_u, n_v) in zip(degree.tolist(), size.tolist(), strict=True):
-        ends = np.cumsum([k, n_u + degree_u + 1, n_v + degree_v + 1])
-        net = Pw[p : p + n_u * n_v].reshape(n_u, n_v, 4)
-        surfaces.append(NurbsSurface(degree_u, degree_v, knots[ends[0] : ends[1]], knots[ends[1] : ends[2]], net))
-        k, p = ends[2], p + n_u * n_v
-    return surfaces

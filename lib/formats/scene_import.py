@@ -63,6 +63,7 @@ def assemble(placed, notes, table, up):
         names=[one.name for one in placed],
         files=names.numbered_stems([one.name for one in placed]),
         surfaces=[one.surface for one in placed],
+        front=np.full(len(placed), -1, dtype=np.int32),
         flip=flip,
         role=[row["role"] for row in rows],
         E=E,

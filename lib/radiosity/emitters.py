@@ -94,6 +94,19 @@ def facets_of(surface, flip=False):
     return Facets(origin[keep], e1[keep], e2[keep], triangle[keep], normal, area, weight)
 
 
+def facets_of_triangles(corners, area):
+    """Facets of a surface that is known by its triangles: corners, three arrays (k, 3) round the lit side; area [of
+    the exact surface] they stand for."""
+    a, b, c = corners
+    cross = np.cross(b - a, c - a)
+    length = np.linalg.norm(cross, axis=1)
+    keep = length > 1e-9 * length.max(initial=0.0)
+    own = length[keep] / 2
+    weight = np.full(own.shape, area / max(own.sum(), 1e-300))
+    triangle = np.ones(own.shape, dtype=bool)
+    return Facets(a[keep], (b - a)[keep], (c - a)[keep], triangle, cross[keep] / length[keep, None], own, weight)
+
+
 def _cell_corners(S):
     """Corners (0, 0), (1, 0), (0, 1), (1, 1) of the cells of a grid, each (h - 1, w - 1, 3)."""
     return S[:-1, :-1], S[:-1, 1:], S[1:, :-1], S[1:, 1:]
@@ -149,15 +162,15 @@ def _cell_areas(surface, u, v, order=4):
 def gather_emitters(surfaces, flip, E, group):
     """Emitters of a scene.
 
-    surfaces : list of n NurbsSurface in the scene's frame; flip (n,) bool; E (n, 3) exitance, an emitter is E > 0;
+    surfaces : list of n NurbsSurface in the scene's frame, or Facets of other kinds; flip (n,) bool; E (n, 3) exitance, an emitter is E > 0;
     group (n,) int.
     """
     lit = np.flatnonzero(np.asarray(E).max(axis=1, initial=0.0) > 0)
-    parts = [facets_of(surfaces[s], bool(flip[s])) for s in lit]
+    parts = [surfaces[s] if isinstance(surfaces[s], Facets) else facets_of(surfaces[s], bool(flip[s])) for s in lit]
     fields = Facets.__dataclass_fields__
     empty = {name: np.zeros((0, 3)) for name in ("origin", "e1", "e2", "normal")}
     empty |= {"is_triangle": np.zeros(0, dtype=bool), "area": np.zeros(0), "weight": np.zeros(0)}
     facets = Facets(**{name: np.concatenate([empty[name], *(getattr(p, name) for p in parts)]) for name in fields})
     first = np.concatenate([[0], np.cumsum([len(p.area) for p in parts])]).astype(np.int64)
-    is_curved = np.array([_is_bent(surfaces[s]) for s in lit], dtype=bool)
+    is_curved = np.array([isinstance(surfaces[s], Facets) or _is_bent(surfaces[s]) for s in lit], dtype=bool)
     return Emitters(facets, first, np.asarray(E, dtype=np.float64)[lit], np.asarray(group)[lit], lit, is_curved)

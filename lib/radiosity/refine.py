@@ -1,5 +1,7 @@
 """Refinement of all trees of a chunk together, level by level: every new sample of a level is measured in one batch."""
 
+from functools import partial
+
 import numpy as np
 
 from lib.elements.balance import parents
@@ -33,6 +35,7 @@ def refine(world, trees, sample, seed, tau, top, recheck=None):
 
 def _measure(world, trees, at, sample, seed):
     """Put the samples of all trees at crossings {surface: (j, i)}, measured in one batch."""
+    at = {s: needed_of(world, trees[s], s, place) for s, place in at.items()}
     at = {s: place for s, place in at.items() if len(place[0])}
     if not at:
         return
@@ -44,6 +47,22 @@ def _measure(world, trees, at, sample, seed):
         trees[s].put(place, *(array[part] for array in measured))
 
 
+def needed_of(world, tree, s, at):
+    """Those of the crossings `at` (j, i) that a part of surface s lies beside; the others are put down as hidden."""
+    needed = world.is_needed(s, tree.level)
+    if needed is None or not len(at[0]):
+        return at
+    wanted = needed[at]
+    tree.put(tuple(axis[~wanted] for axis in at), 0.0, True, 0.0, np.inf)
+    return tuple(axis[wanted] for axis in at)
+
+
+def tree_of(world, s, base):
+    """An empty Quadtree of surface s."""
+    cover = None if world.domain(s) is None else partial(world.cover, s)
+    return Quadtree(world.lattices[s], base, world.channels, world.side(s), cover, world.finest(s))
+
+
 def refine_direct(world, base, seed, tau, top, shadow_rays):
     """Direct trees from their base lattices.
 
@@ -51,7 +70,7 @@ def refine_direct(world, base, seed, tau, top, shadow_rays):
     """
     trees, spared = {}, np.zeros(3, dtype=np.int64)
     for s, (value, hidden, noise, level) in base.items():
-        trees[s] = Quadtree(world.lattices[s], level, world.channels, world.side(s))
+        trees[s] = tree_of(world, s, level)
         own = trees[s].wanted()
         trees[s].put(own, value[own], hidden[own], noise[own], np.inf)
 
@@ -74,9 +93,7 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
     solution : has spread, H_element, n_u, n_v, first; K (surfaces,) gather rays
     for a large cell of usual surroundings.
     """
-    trees = {
-        s: Quadtree(world.lattices[s], world.base_level(s, level), world.channels, world.side(s)) for s in surfaces
-    }
+    trees = {s: tree_of(world, s, world.base_level(s, level)) for s in surfaces}
 
     def sample(points):
         n = len(points.x)

@@ -11,6 +11,8 @@ from lib.nurbs.evaluate import evaluate_grid, frame_grid
 from lib.radiosity.direct import direct_light
 from lib.radiosity.rows import Rows, element_rows, without
 from lib.radiosity.world import FINEST
+from lib.surfaces.frames import density as frame_density
+from lib.surfaces.frames import frame, whole
 from lib.visibility.hidden import are_buried
 from lib.visibility.qmc import shift, stream
 
@@ -37,9 +39,8 @@ def points_at(world, seed, wanted, level_of):
     """
     parts = []
     for s, (j, i) in wanted.items():
-        x, N = receivers(
-            world.surface(s), world.scene.flip[s], world.casters.sag[s], world.lattices[s], level_of[s], j, i
-        )
+        own = world.scene.flip[s], world.casters.sag[s], world.lattices[s]
+        x, N = receivers(world.surface(s), *own, level_of[s], j, i, world.domain(s))
         up = 2 ** (FINEST - level_of[s])
         cell = np.full(len(j), world.side(s) * 2.0 ** -level_of[s])
         h, w = world.lattices[s].shape(level_of[s])
@@ -74,7 +75,11 @@ def base_lattice(world, surfaces, seed, level, shadow_rays):
     level : of large surfaces; smaller ones begin coarser.
     """
     level_of = {s: world.base_level(s, level) for s in surfaces}
-    wanted = {s: np.nonzero(world.lattices[s].is_own(level_of[s])) for s in surfaces}
+    needed = {s: world.is_needed(s, level_of[s]) for s in surfaces}
+    wanted = {
+        s: np.nonzero(world.lattices[s].is_own(level_of[s]) & (True if needed[s] is None else needed[s]))
+        for s in surfaces
+    }
     if not wanted:
         return {}, (0, 0, 0)
     points = points_at(world, seed, wanted, level_of)
@@ -85,7 +90,7 @@ def base_lattice(world, surfaces, seed, level, shadow_rays):
         first += len(j)
         shape = world.lattices[s].shape(level_of[s])
         value = np.zeros((*shape, world.channels), dtype=np.float32)
-        shade, noise = np.zeros(shape, dtype=bool), np.zeros(shape, dtype=np.float32)
+        shade, noise = np.full(shape, needed[s] is not None), np.zeros(shape, dtype=np.float32)
         value[j, i], shade[j, i], noise[j, i] = light.H[part].reshape(len(j), -1), hidden[part], light.noise[part]
         out[s] = (*(world.lattices[s].copy_own(array) for array in (value, shade, noise)), level_of[s])
     return out, (light.below_horizon, light.dim, light.agreed)
@@ -105,39 +110,95 @@ class Elements:
 def surface_elements(world, s, seed, grids, R, base):
     """Elements of surface s: their points, rows and direct light.
 
-    base : (value, hidden, ...) of the surface's base lattice; R rays per element, 0 casts none (one bounce).
+    base : (value, hidden, noise, level) of the surface's base lattice; R rays per element, 0 casts none (one bounce).
     """
     n_u, n_v = int(grids.n_u[s]), int(grids.n_v[s])
-    surface = world.surface(s)
     u, v = point_parameters(n_u, n_v)
-    S, N = frame_grid(surface, u, v)
-    N = -N if world.scene.flip[s] else N
-    _, S_u, S_v = evaluate_grid(surface, u, v)
-    density = by_element(np.linalg.norm(np.cross(S_u, S_v), axis=2))
-    x = by_element(S + N * (world.casters.sag[s] + OFFSET))
+    on = points_on(world, s, u, v)
+    lifted = on.S + on.N * (world.casters.sag[s] + OFFSET)
     number = np.arange(n_u * n_v)
     shifts = shift(stream(f"{seed} rows", world.scene.names[s]), number % n_u, number // n_u)
+    outside = by_element(~on.is_part)
     if R:
-        rows = element_rows(x, by_element(N), shifts, R, world.tracer, world.mesh, grids)
+        rows = element_rows(by_element(lifted), by_element(on.N), shifts, R, world.tracer, world.mesh, grids, ~outside)
     else:
-        none = np.full(density.shape, -1, dtype=np.int32)
-        rows = Rows(none, np.zeros(none.shape, dtype=np.uint8), np.zeros(density.shape, dtype=bool))
-    found, is_walled = _parts(world, s, S + N * OFFSET, rows.is_hidden, n_u, n_v)
+        none = np.full(outside.shape, -1, dtype=np.int32)
+        rows = Rows(none, np.zeros(none.shape, dtype=np.uint8), outside)
+    found, is_walled = _parts(world, s, on.S + on.N * OFFSET, rows.is_hidden, n_u, n_v)
     rows = without(rows, ~found.keeps & ~rows.is_hidden)
     visible = ~rows.is_hidden
-    area = (density * visible).mean(axis=1) / (n_u * n_v)
-    value, hidden = base[:2]
+    area = (by_element(on.density) * visible).mean(axis=1) / (n_u * n_v)
+    value, hidden, _, level = base
     light = _bilinear(value, hidden, u, v)
     beside = _beside_walls(is_walled, hidden.shape)
-    if beside.any():  # between samples of two rooms nothing can be interpolated
+    cover = world.cover(s, level)
+    if cover is not None:
+        beside |= cover[1][_cells_of(v, hidden.shape[0])][:, _cells_of(u, hidden.shape[1])]
+    beside &= on.is_part
+    if beside.any():  # between samples of two rooms, or of two charts, nothing can be interpolated
         key = stream(f"{seed} elements", world.scene.names[s])
         j, i = np.nonzero(beside)
-        lifted = S[beside] + N[beside] * (world.casters.sag[s] + OFFSET)
-        points = Points(np.full(len(j), s), None, None, lifted, N[beside], shift(key, i, j))
+        points = Points(np.full(len(j), s), None, None, lifted[beside], on.N[beside], shift(key, i, j))
         light[beside] = direct_at(world, points, FEW_RAYS)[0].H.reshape(len(j), -1)
     light = by_element(light)
     count = np.maximum(visible.sum(axis=1), 1)[:, None]
-    return Elements(rows, found.is_alone, area, (light * visible[..., None]).sum(axis=1) / count)
+    is_alone = found.is_alone | _between_charts(by_element(on.chart), outside, n_u, n_v)
+    return Elements(rows, is_alone, area, (light * visible[..., None]).sum(axis=1) / count)
+
+
+@dataclass(frozen=True)
+class OnSurface:
+    """Points of a surface on a tensor grid (h, w): S, N (h, w, 3); density (h, w), area over area of the map, 0 where
+    no part of the surface is; is_part (h, w) bool; chart (h, w) int."""
+
+    S: np.ndarray
+    N: np.ndarray
+    density: np.ndarray
+    is_part: np.ndarray
+    chart: np.ndarray
+
+
+def points_on(world, s, u, v):
+    """OnSurface of the tensor grid u, v, the middles of equal cells.
+
+    Where the surface does not fill its map, a cell that holds some of it has a point on it, and counts by the share it
+    holds; the whole is as large as the surface.
+    """
+    surface, domain, turn = world.surface(s), world.domain(s), -1.0 if world.scene.flip[s] else 1.0
+    shape = len(v), len(u)
+    if domain is None:
+        S, N = frame_grid(whole(surface), u, v)
+        _, S_u, S_v = evaluate_grid(whole(surface), u, v)
+        density = np.linalg.norm(np.cross(S_u, S_v), axis=2)
+        return OnSurface(S, N * turn, density, np.ones(shape, dtype=bool), np.zeros(shape, dtype=np.int64))
+    chart, share = domain.shares(*shape)
+    is_part = chart >= 0
+    S, N, density = np.zeros((*shape, 3)), np.zeros((*shape, 3)), np.zeros(shape)
+    N[..., 2] = 1.0
+    j, i = np.nonzero(is_part)
+    places = domain.locate(np.stack([u[i], v[j]], axis=1))
+    S[j, i], N[j, i] = frame(surface, places.uv, places.face)
+    density[j, i] = frame_density(surface, places.uv, places.face) * share[j, i]
+    density *= world.casters.area[s] / max(density.mean(), 1e-300)
+    chart[j, i] = places.chart
+    return OnSurface(S, N * turn, density, is_part, chart)
+
+
+def _between_charts(chart, outside, n_u, n_v):
+    """(n_v n_u,) bool: elements with points of several charts, or beside one with points of another."""
+    low = np.where(outside, np.iinfo(np.int64).max, chart).min(axis=1).reshape(n_v, n_u)
+    high = np.where(outside, -1, chart).max(axis=1).reshape(n_v, n_u)
+    around_low, around_high = np.pad(low, 1, mode="edge"), np.pad(high, 1, mode="edge")
+    for dj in range(3):
+        for di in range(3):
+            low = np.minimum(low, around_low[dj : dj + n_v, di : di + n_u])
+            high = np.maximum(high, around_high[dj : dj + n_v, di : di + n_u])
+    return (high > low).ravel()
+
+
+def _cells_of(t, n):
+    """Cell of a lattice with n crossings that holds each parameter t."""
+    return np.minimum((t * (n - 1)).astype(int), n - 2)
 
 
 def _parts(world, s, x, hidden, n_u, n_v):
@@ -167,8 +228,8 @@ def _beside_walls(blocked, shape):
     ):
         walled[first] |= link
         walled[last] |= link
-    cell_j = ((np.arange(rows) + 0.5) / rows * (shape[0] - 1)).astype(int)
-    cell_i = ((np.arange(columns) + 0.5) / columns * (shape[1] - 1)).astype(int)
+    cell_j = _cells_of((np.arange(rows) + 0.5) / rows, shape[0])
+    cell_i = _cells_of((np.arange(columns) + 0.5) / columns, shape[1])
     cells = np.zeros((shape[0] - 1, shape[1] - 1), dtype=bool)
     j, i = np.nonzero(walled)
     cells[cell_j[j], cell_i[i]] = True
@@ -180,7 +241,7 @@ def _bilinear(value, hidden, u, v):
     h, w = value.shape[:2]
     seen = ~hidden[..., None]
     value = np.concatenate([value * seen, seen], axis=2)
-    i, j = np.minimum((u * (w - 1)).astype(int), w - 2), np.minimum((v * (h - 1)).astype(int), h - 2)
+    i, j = _cells_of(u, w), _cells_of(v, h)
     fu, fv = (u * (w - 1) - i)[None, :, None], (v * (h - 1) - j)[:, None, None]
     rows = value[j] * (1 - fv) + value[j + 1] * fv
     light = rows[:, i] * (1 - fu) + rows[:, i + 1] * fu

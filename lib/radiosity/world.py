@@ -12,14 +12,18 @@ from lib.elements.grids import element_grids
 from lib.elements.lattice import Lattice, roots_of
 from lib.nurbs.coincident import back_to_back
 from lib.nurbs.evaluate import frame_grid
-from lib.nurbs.shape import transformed
-from lib.radiosity.emitters import gather_emitters
+from lib.nurbs.surface import NurbsSurface
+from lib.radiosity.emitters import facets_of_triangles, gather_emitters
+from lib.surfaces.frames import domain_of, whole
+from lib.surfaces.measure import transformed
+from lib.surfaces.mesh import Mesh
 from lib.visibility.mesh_lookup import MeshLookup
 from lib.visibility.tracer import Tracer
 
 FINEST = 10  # positions are hashed on this level's lattice: a crossing draws the same rays at whatever level it is met
 LARGE = 0.25  # root cells from this side on, in the scene's largest side, start their trees in full
 APART = 2e-5  # in the frame: more than float32 rays err by, less than their origins are lifted
+PLACED = 8  # level of a trimmed surface's lattice whose cells say how dense its border is walked
 TURN = 0.6  # radians between normals of neighbouring base samples: beyond, light that depends on direction is missed
 
 
@@ -32,7 +36,7 @@ def _steepest(N):
 class World:
     """What sample and refine need of a scene.
 
-    scene : has names, surfaces (world units), flip, role, E, group, groups, is_black
+    scene : has names, surfaces (world units), front, flip, role, E, group, groups, is_black
     casters : has centre, scale, V, F, UV, face_surface, sag, area, extent, is_planar, is_closed, is_collapsed, shell
     """
 
@@ -51,10 +55,46 @@ class World:
         self._frame = np.eye(4) / casters.scale
         self._frame[:3, 3] = -np.asarray(casters.centre) / casters.scale
         self._frame[3, 3] = 1.0
+        self._surfaces, self._domains, self._covers = {}, {}, {}
 
     def surface(self, s):
         """Surface s in the scene's frame."""
-        return transformed(self.scene.surfaces[s], self._frame)
+        if s not in self._surfaces:
+            self._surfaces[s] = transformed(self.scene.surfaces[s], self._frame)
+        return self._surfaces[s]
+
+    def domain(self, s):
+        """The Domain of surface s, None if it fills its map."""
+        if s not in self._domains:
+            level = self.finest(s)
+            rows, columns = self.lattices[s].cells(PLACED if level is None else level)
+            self._domains[s] = domain_of(self.surface(s), (columns, rows))
+        return self._domains[s]
+
+    def finest(self, s):
+        """Level of the atlas of a mesh, which keeps its charts apart; None for other surfaces."""
+        surface = self.scene.surfaces[s]
+        return surface.level if isinstance(surface, Mesh) else None
+
+    def cover(self, s, level):
+        """(needed, straddling) cells of a level of surface s (see Domain.cover); None if it fills its map."""
+        if self.domain(s) is None:
+            return None
+        if (s, level) not in self._covers:
+            self._covers[s, level] = self.domain(s).cover(*self.lattices[s].cells(level))
+        return self._covers[s, level]
+
+    def is_needed(self, s, level):
+        """(h, w) bool: crossings that are a corner of a needed cell; None if all are."""
+        cover = self.cover(s, level)
+        if cover is None:
+            return None
+        needed = np.zeros(self.lattices[s].shape(level), dtype=bool)
+        rows, columns = cover[0].shape
+        for dj in (0, 1):
+            for di in (0, 1):
+                needed[dj : dj + rows, di : di + columns] |= cover[0]
+        return self.lattices[s].share_own(needed)
 
     def side(self, s):
         """Mean side of a root cell of surface s along its longer direction, in the scene's frame."""
@@ -65,10 +105,10 @@ class World:
         are flat.
         """
         least = int(np.clip(level + np.round(np.log2(self.side(s) / LARGE)), 1, level))
-        if self.casters.is_planar[s] or least == level:
+        if self.casters.is_planar[s] or least == level or self.finest(s) is not None:
             return least
         h, w = self.lattices[s].shape(level)
-        N = frame_grid(self.surface(s), np.linspace(0, 1, w), np.linspace(0, 1, h))[1]
+        N = frame_grid(whole(self.surface(s)), np.linspace(0, 1, w), np.linspace(0, 1, h))[1]
         while least < level and _steepest(N[:: 2 ** (level - least), :: 2 ** (level - least)]) < np.cos(TURN):
             least += 1
         return least
@@ -77,9 +117,18 @@ class World:
     def emitters(self):
         """All emitters, in the scene's frame; cast_only ones shine too."""
         lit = np.asarray(self.scene.E).max(axis=1, initial=0.0) > 0
-        surfaces = [self.surface(s) if lit[s] else None for s in range(self.n)]
+        surfaces = [self._emitting(s) if lit[s] else None for s in range(self.n)]
         found = gather_emitters(surfaces, self.scene.flip, self.scene.E, self.scene.group)
         return replace(found, is_curved=found.is_curved | self._is_back_to_back[found.surface])
+
+    def _emitting(self, s):
+        """Surface s as gather_emitters takes it: whole NURBS exactly, of others the triangles that cast shadows."""
+        if isinstance(self.scene.surfaces[s], NurbsSurface):
+            return self.surface(s)
+        c, front = self.casters, int(self.scene.front[s])
+        F = c.F[c.face_surface == (s if front < 0 else front)]
+        F = F if front < 0 else F[:, ::-1]
+        return facets_of_triangles(tuple(c.V[F[:, k]] for k in range(3)), float(c.area[s]))
 
     @cached_property
     def tracer(self):
@@ -92,8 +141,8 @@ class World:
         face = self._is_back_to_back[c.face_surface]
         V = np.array(c.V)
         vertex, first = np.unique(c.F[face], return_index=True)
-        V[vertex] += APART * self.mesh.normal[face][first // 3]
-        return Tracer(V, c.F)
+        V[vertex] += APART * self.mesh.normal[: len(face)][face][first // 3]
+        return Tracer(V, c.F, self.mesh.two_sided)
 
     @cached_property
     def _is_back_to_back(self):
@@ -103,7 +152,15 @@ class World:
     def mesh(self):
         """What its faces mean."""
         c = self.casters
-        return MeshLookup(c.V, c.F, c.UV, c.face_surface, c.shell)
+        return MeshLookup(c.V, c.F, c.UV, c.face_surface, c.face_shell, self._back_of)
+
+    @property
+    def _back_of(self):
+        """(n,) the surface that is the back of each, -1 without one."""
+        front = self.scene.front
+        back_of = np.full(self.n, -1)
+        back_of[front[front >= 0]] = np.flatnonzero(front >= 0)
+        return back_of
 
     def grids(self, n_elements):
         """Element grids of the scene."""

@@ -8,18 +8,26 @@ from lib.elements.grids import POINTS
 class MeshLookup:
     """Per-face tables over the caster mesh.
 
-    V (n_v, 3);  face_surface (m,) int; UV (n_v, 2); F (m, 3); shell (n,) int, -1 where the surface belongs to no
-    closed shell.
+    V (n_v, 3);  face_surface (m,) int; UV (n_v, 2); F (m, 3); in_shell (m,) bool, the face belongs to a closed shell;
+    back_of (n,) surface that is the back of each, -1 without one (None: of all).  Where there are such, the tables hold
+    2 m faces, the second half for rays from behind (see Tracer); backs that belong to no surface stay as they are.
     """
 
-    def __init__(self, V, F, UV, face_surface, shell):
-        self.face_surface = np.asarray(face_surface)
+    def __init__(self, V, F, UV, face_surface, in_shell, back_of=None):
+        self.face_surface, in_shell = np.asarray(face_surface), np.asarray(in_shell, dtype=bool)
         corners = np.asarray(UV, dtype=np.float64)[np.asarray(F)]
         self._uv = np.stack([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1)
         V = np.asarray(V, dtype=np.float64)
         cross = np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]) if len(F) else np.zeros((0, 3))
         self.normal = cross / np.maximum(np.linalg.norm(cross, axis=1), 1e-300)[:, None]
-        self._is_shell = np.append((np.asarray(shell) >= 0)[self.face_surface], False)
+        self.two_sided = None
+        if back_of is not None and (np.asarray(back_of) >= 0).any():
+            behind = np.asarray(back_of)[self.face_surface]
+            self.two_sided = behind >= 0
+            self.face_surface = np.concatenate([self.face_surface, np.where(behind >= 0, behind, self.face_surface)])
+            self._uv, self.normal = np.concatenate([self._uv, self._uv]), np.concatenate([self.normal, -self.normal])
+            in_shell = np.concatenate([in_shell, in_shell])
+        self._is_shell = np.append(in_shell, False)
 
     def is_shell(self, face):
         """(n,) bool: the face belongs to a closed shell; False for -1."""

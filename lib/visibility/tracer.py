@@ -34,12 +34,16 @@ class Hits:
 
 
 class Tracer:
-    """A scene of triangles V (n, 3), F (m, 3) ready for rays; both in the scene's frame, so that float32 is enough."""
+    """A scene of triangles V (n, 3), F (m, 3) ready for rays; both in the scene's frame, so that float32 is enough.
 
-    def __init__(self, V, F):
+    two_sided (m,) bool: faces whose back is the front of another surface; a ray that arrives there meets face + m from
+    its front.
+    """
+
+    def __init__(self, V, F, two_sided=None):
         self._V = np.ascontiguousarray(V, dtype=np.float32)  # kept: the scene reads them while it lives
         self._F = np.ascontiguousarray(F, dtype=np.int32)
-        self._scene = None
+        self._scene, self._two_sided = None, two_sided
         if len(self._F):
             self._scene = EmbreeScene(robust=True)
             TriangleMesh(self._scene, self._V, self._F)
@@ -56,7 +60,12 @@ class Tracer:
         hit = self._scene.run(origins, directions, tfar, output=1)
         Ng = hit["Ng"]
         towards = Ng[:, 0] * directions[:, 0] + Ng[:, 1] * directions[:, 1] + Ng[:, 2] * directions[:, 2]
-        return Hits(hit["primID"], hit["u"], hit["v"], towards > 0, hit["tfar"])
+        face, is_back = hit["primID"], towards > 0
+        if self._two_sided is not None:
+            turned = is_back & (face >= 0)
+            turned[turned] = self._two_sided[face[turned]]
+            face, is_back = np.where(turned, face + np.int32(len(self._F)), face), is_back & ~turned
+        return Hits(face, hit["u"], hit["v"], is_back, hit["tfar"])
 
     def is_blocked(self, origins, D):
         """(n,) bool: something stands between each origin and the point origin + D, the last 1/2000 left out."""

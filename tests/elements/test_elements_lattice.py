@@ -5,8 +5,8 @@ from itertools import product
 import numpy as np
 import pytest
 
-from lib.elements.lattice import INSIDE, OFFSET, Lattice, area_density, receivers, roots_of
-from lib.nurbs.evaluate import evaluate, normal, point
+from lib.elements.lattice import INSIDE, OFFSET, Lattice, receivers, roots_of
+from lib.nurbs.evaluate import normal, point
 from lib.nurbs.shape import collapsed_sides, is_closed
 from tests.shapes import CIRCLE, CIRCLE_KNOTS, CIRCLE_WEIGHTS, cylinder, disc, rectangle, revolved, sphere, triangle
 from tests.tolerances import EXACT
@@ -148,12 +148,3 @@ def test_no_samples():
     none = np.zeros(0, dtype=int)
     x, N = receivers(SURFACES["sphere"], False, 0.0, lattice_of(SURFACES["sphere"]), 2, none, none)
     assert x.shape == N.shape == (0, 3)
-
-
-def test_area_density_of_a_sphere():
-    """|S_u x S_v| is the product of its lengths: u and v lines are orthogonal."""
-    u, v = np.random.default_rng(1).uniform(size=(2, 20))
-    _, S_u, S_v = evaluate(sphere(), u, v)
-    expected = np.linalg.norm(S_u, axis=1) * np.linalg.norm(S_v, axis=1)
-    assert area_density(sphere(), u, v) == pytest.approx(expected, rel=1e-9)
-    assert np.abs((normal(sphere(), u, v) * S_u).sum(axis=1)).max() < 1e-8

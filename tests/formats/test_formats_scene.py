@@ -20,6 +20,7 @@ def two():
         names=["a/1", "b"],
         files=["000-a-1", "001-b"],
         surfaces=[wide, bilinear([0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0])],
+        front=np.full(2, -1, dtype=np.int32),
         flip=np.array([True, False]),
         role=["full", "cast_only"],
         E=np.array([[0, 0, 0], [1, 2, 3.5]]),
@@ -72,7 +73,7 @@ def test_a_bad_field_is_named(tmp_path, field, value):
 def test_damaged_files_are_noticed(tmp_path):
     scene.save(tmp_path / "a.npz", two())
     data = bytearray((tmp_path / "a.npz").read_bytes())
-    data[len(data) // 2] ^= 1
+    data[data.index(two().E.tobytes())] ^= 1
     (tmp_path / "b.npz").write_bytes(data)
     (tmp_path / "c.npz").write_bytes(data[:-100])
     for name in ("b.npz", "c.npz", "none.npz"):

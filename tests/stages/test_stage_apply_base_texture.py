@@ -29,6 +29,7 @@ def build(folder, H=None, hidden=None, codes=None):
             names=names,
             files=["000-lamp", "001-painted", "002-wall"],
             surfaces=[square(z) for z in (2, 0, 1)],
+            front=np.full(3, -1, np.int32),
             flip=np.zeros(3, bool),
             role=["full"] * 3,
             E=np.array([[5, 4, 3], [2, 0, 1], [0, 1, 0]], float),

@@ -41,6 +41,7 @@ def build(folder):
             UV=np.zeros((3, 2)),
             F=np.array([[0, 1, 2]], np.int32),
             face_surface=np.zeros(1, np.int32),
+            face_shell=np.zeros(1, bool),
             area=np.ones(n),
             extent=np.ones((n, 2)),
             sag=np.zeros(n),

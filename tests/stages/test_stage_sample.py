@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lib.formats import artefact, samples
+from lib.formats import artefact, casters, samples
 from lib.nurbs.shape import transformed
 from lib.radiosity.form_factors import form_factor_polygon
 from stages import sample
@@ -49,7 +49,7 @@ def test_direct_light_on_the_base_lattice(tmp_path):
 def test_elements_of_all_surfaces_that_reflect(tmp_path):
     """Every element once, rows as long as asked, H_direct the light of its cell."""
     bake, (x,) = sampled(tmp_path, still_life(), rays_per_element=32)
-    grids = artefact.read(bake.path("casters"), "casters", 1)[1]
+    grids = vars(casters.load(bake.path("casters")))
     assert x.element.tolist() == list(range(len(x.element)))
     assert x.entries.shape == (len(x.element), 32) and x.entries.max() < len(x.element)
     total = grids["area"][[0, 2, 3]].sum()  # floor, tube, wall: the lamp is black

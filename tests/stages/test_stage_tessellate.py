@@ -21,6 +21,7 @@ def small_scene(scale=1.0, flip=()):
         names=names,
         files=[f"{k:03d}-s" for k in range(n)],
         surfaces=surfaces,
+        front=np.full(n, -1, np.int32),
         flip=np.isin(names, flip),
         role=["cast_only", *["full"] * (n - 2), "receive_only"],
         E=np.zeros((n, 3)),

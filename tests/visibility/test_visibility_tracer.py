@@ -121,7 +121,7 @@ def test_hits_on_the_inside_are_back_faces():
 def lookup(shell=(-1, -1)):
     """Surface 0: the triangle below the diagonal with 2 x 1 elements; surface 1: the other one, without elements."""
     grids = ElementGrids(np.array([2, 0]), np.array([1, 0]), np.array([0, 2, 2]))
-    return MeshLookup(V, F, V[:, :2], [0, 1], np.array(shell)), grids
+    return MeshLookup(V, F, V[:, :2], [0, 1], np.array(shell) >= 0), grids
 
 
 def test_hits_become_elements():
@@ -135,7 +135,7 @@ def test_hits_become_elements():
 
 def test_elements_of_a_finer_grid():
     """Element j n_u + i of (u, v) on a whole square."""
-    mesh = MeshLookup(V, F, V[:, :2], [0, 0], np.array([-1]))
+    mesh = MeshLookup(V, F, V[:, :2], [0, 0], np.zeros(2, dtype=bool))
     grids = ElementGrids(np.array([4]), np.array([3]), np.array([0, 12]))
     uv = np.random.default_rng(4).random((500, 2))
     hits = Tracer(V, F).closest(*rays(np.append(uv, np.ones((500, 1)), axis=1), np.tile(DOWN, (500, 1))))
@@ -150,6 +150,17 @@ def test_shells_and_normals():
     mesh, _ = lookup(shell=(-1, 3))
     assert mesh.is_shell(np.array([0, 1, -1])).tolist() == [False, True, False]
     assert mesh.normal.tolist() == [[0, 0, 1], [0, 0, 1]]
+
+
+def test_a_back_may_be_the_front_of_another_surface():
+    """Surface 2 is the back of surface 1, the triangle above the diagonal; the other has no back."""
+    mesh = MeshLookup(V, F, V[:, :2], [0, 1], np.zeros(2, dtype=bool), np.array([-1, 2, -1]))
+    tracer = Tracer(V, F, mesh.two_sided)
+    hits = tracer.closest(*rays([[0.2, 0.2, -1], [0.9, 0.9, -1], [0.9, 0.9, 1], [5, 5, -1]], [UP, UP, DOWN, UP]))
+    assert hits.face.tolist() == [0, 3, 1, -1]
+    assert hits.is_back.tolist() == [True, False, False, False]
+    assert mesh.face_surface[hits.face[:3]].tolist() == [0, 2, 1]
+    assert mesh.normal[hits.face[:3]].tolist() == [[0, 0, 1], [0, 0, -1], [0, 0, 1]]
 
 
 def test_texel_coordinates_span_the_map():

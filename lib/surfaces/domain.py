@@ -1,0 +1,180 @@
+"""The part of a map's [0, 1] x [0, 1] that belongs to a surface: triangles in (u, v), in charts.
+
+A sample of the lattice may lie outside the part, or so near its border that half of what it sees is the wall that
+stands there.  It is then taken at the nearest place a little inside, so that the bilinear lookup finds values on both
+sides of the border and no texel stays empty there.  Samples of different charts have nothing to do with each other:
+`straddles` tells which cells hold parts of two, or have a corner that belongs to another.
+"""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from lib.visibility.tracer import Tracer
+
+INSIDE = 1e-3  # in (u, v): samples keep this distance from the border, as far as the triangles are wide enough
+SPACING = 0.5  # of a finest cell, between the places along the border that samples are moved to
+PARTS, LEAST_SHARE = 4, 1 / 64  # of a cell along the border, each way, and of its area where none of them is inside
+MOST_PLACES = 64  # along one edge of a triangle
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where samples of a domain are taken: uv (n, 2), face (n,) triangle of the domain, chart (n,) its chart,
+    is_inside (n,) bool: not moved from outside."""
+
+    uv: np.ndarray
+    face: np.ndarray
+    chart: np.ndarray
+    is_inside: np.ndarray
+
+
+class Domain:
+    """Point location in the triangles uv (m, 3, 2) of a surface, chart (m,) int; cells : of its finest lattice along
+    (u, v)."""
+
+    def __init__(self, uv, chart, cells):
+        self.uv = np.asarray(uv, dtype=np.float64)
+        self.chart = np.asarray(chart, dtype=np.int64)
+        self.cells = cells
+        flat = np.concatenate([self.uv.reshape(-1, 2), np.zeros((3 * len(self.uv), 1))], axis=1)
+        self._tracer = Tracer(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
+
+    @cached_property
+    def is_single(self):
+        """True if all triangles are of one chart: nothing can straddle."""
+        return not len(self.chart) or bool((self.chart == self.chart[0]).all())
+
+    @cached_property
+    def _is_border(self):
+        """(m, 3) bool: the edge opposite to corner k of a triangle belongs to no other triangle of its chart."""
+        m = len(self.uv)
+        points = np.concatenate([self.uv.reshape(-1, 2), np.repeat(self.chart, 3)[:, None]], axis=1)
+        _, corner = np.unique(points, axis=0, return_inverse=True)
+        corner = corner.reshape(m, 3)
+        edge = np.stack([corner[:, [1, 2]], corner[:, [2, 0]], corner[:, [0, 1]]], axis=1)
+        edge = np.sort(edge.reshape(-1, 2), axis=1)
+        _, which, count = np.unique(edge, axis=0, return_inverse=True, return_counts=True)
+        return (count[which.ravel()] == 1).reshape(m, 3)
+
+    @cached_property
+    def _border(self):
+        """Places along the border: uv (k, 2) on it, inner (k, 2) a little inside, face (k,)."""
+        face, opposite = np.nonzero(self._is_border)
+        a, b = self.uv[face, (opposite + 1) % 3], self.uv[face, (opposite + 2) % 3]
+        length = np.abs(b - a) * self.cells
+        count = np.clip(np.ceil(length.max(axis=1, initial=0.0) / SPACING), 1, MOST_PLACES).astype(np.int64)
+        count = np.maximum(count, 2)
+        row = np.repeat(np.arange(len(face)), count)
+        t = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[row]
+        on = a[row] + t[:, None] * (b - a)[row]
+        inner = self._moved_in(on, face[row])
+        return on, inner, face[row]
+
+    def _barycentric(self, uv, face):
+        """(n, 3) weights of the corners of the triangles `face` at uv."""
+        a, b, c = (self.uv[face, k] for k in range(3))
+        e, f, p = b - a, c - a, uv - a
+        double = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
+        double = np.where(np.abs(double) > 1e-300, double, 1e-300)
+        second = (p[:, 0] * f[:, 1] - p[:, 1] * f[:, 0]) / double
+        third = (e[:, 0] * p[:, 1] - e[:, 1] * p[:, 0]) / double
+        return np.stack([1 - second - third, second, third], axis=1)
+
+    def _moved_in(self, uv, face):
+        """Places uv (n, 2) of triangles `face`, moved towards the middle where they lie within INSIDE of the border."""
+        weight = np.clip(self._barycentric(uv, face), 0.0, 1.0)
+        weight /= weight.sum(axis=1, keepdims=True)
+        corner = self.uv[face]
+        side = np.linalg.norm(np.roll(corner, -1, axis=1) - np.roll(corner, 1, axis=1), axis=2)  # opposite to each
+        e, f = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+        height = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0])[:, None] / np.maximum(side, 1e-300)
+        least = np.minimum(INSIDE / np.maximum(height, 1e-300), 0.25)
+        least = np.where(self._is_border[face], least, 0.0)
+        # Towards the centroid by t: weight' = weight + t (1/3 - weight).
+        short = np.maximum(least - weight, 0.0)
+        t = (short / (1 / 3 - np.minimum(weight, 0.3))).max(axis=1)[:, None]
+        weight = weight + t * (1 / 3 - weight)
+        return np.einsum("nk,nkc->nc", weight, corner)
+
+    def locate(self, uv):
+        """The Places of samples uv (n, 2)."""
+        uv = np.asarray(uv, dtype=np.float64)
+        face = self.face_at(uv)
+        is_inside = face >= 0
+        place = np.empty_like(uv)
+        out = np.flatnonzero(~is_inside)
+        if out.size:
+            nearest = self._tree.query(uv[out])[1]
+            _, inner, owner = self._border
+            place[out], face[out] = inner[nearest], owner[nearest]
+        inside = np.flatnonzero(is_inside)
+        place[inside] = self._moved_in(uv[inside], face[inside])
+        return Places(place, face, self.chart[face], is_inside)
+
+    @cached_property
+    def _tree(self):
+        from scipy.spatial import cKDTree  # here: it takes longer to load than most scenes to locate
+
+        return cKDTree(self._border[0])
+
+    def face_at(self, uv):
+        """(n,) triangle at each of uv (n, 2), -1 outside."""
+        origins = np.concatenate([uv, np.ones((len(uv), 1))], axis=1).astype(np.float32)
+        down = np.broadcast_to(np.array([0, 0, -1], dtype=np.float32), origins.shape)
+        return self._tracer.closest(origins, np.ascontiguousarray(down)).face.astype(np.int64)
+
+    def coverage(self, rows, columns):
+        """What the cells of a uniform grid hold: (chart of the first (rows, columns) int64, -1 where nothing; bool,
+        more than one)."""
+        u, v = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
+        face = self.face_at(np.stack([u.ravel(), v.ravel()], axis=1))
+        middle = np.where(face >= 0, self.chart[np.maximum(face, 0)], -1)
+        on, _, owner = self._border
+        i = np.clip((on[:, 0] * columns).astype(np.int64), 0, columns - 1)
+        j = np.clip((on[:, 1] * rows).astype(np.int64), 0, rows - 1)
+        cell = np.concatenate([np.flatnonzero(middle >= 0), j * columns + i])
+        chart = np.concatenate([middle[middle >= 0], self.chart[owner]])
+        low = np.full(rows * columns, np.iinfo(np.int64).max)
+        high = np.full(rows * columns, -1)
+        np.minimum.at(low, cell, chart)
+        np.maximum.at(high, cell, chart)
+        is_mixed = (high > low) & (high >= 0)
+        return np.where(high >= 0, low, -1).reshape(rows, columns), is_mixed.reshape(rows, columns)
+
+    def shares(self, rows, columns):
+        """(chart (rows, columns) as in `coverage`, share (rows, columns) of each cell that is part of the surface)."""
+        chart, _ = self.coverage(rows, columns)
+        share = (chart >= 0).astype(np.float64)
+        on = self._border[0]
+        i = np.clip((on[:, 0] * columns).astype(np.int64), 0, columns - 1)
+        j = np.clip((on[:, 1] * rows).astype(np.int64), 0, rows - 1)
+        j, i = np.divmod(np.unique(j * columns + i), columns)
+        if len(j):
+            step = (np.arange(PARTS) + 0.5) / PARTS
+            u = ((i[:, None, None] + step[None, None]) / columns).repeat(PARTS, axis=1)
+            v = ((j[:, None, None] + step[None, :, None]) / rows).repeat(PARTS, axis=2)
+            inside = self.face_at(np.stack([u.ravel(), v.ravel()], axis=1)).reshape(len(j), -1) >= 0
+            share[j, i] = np.maximum(inside.mean(axis=1), LEAST_SHARE)
+        return chart, share
+
+    def cover(self, rows, columns):
+        """(needed (rows, columns) bool: cells with a part of the surface; straddling (rows, columns) bool: needed ones
+        with parts of two charts, or a corner that is taken from another)."""
+        chart, is_mixed = self.coverage(rows, columns)
+        needed = chart >= 0
+        if self.is_single or not needed.any():
+            return needed, np.zeros_like(needed)
+        corner = np.zeros((rows + 1, columns + 1), dtype=bool)
+        for dj in (0, 1):
+            for di in (0, 1):
+                corner[dj : dj + rows, di : di + columns] |= needed
+        j, i = np.nonzero(corner)
+        owner = np.full(corner.shape, -1, dtype=np.int64)
+        owner[j, i] = self.locate(np.stack([i / columns, j / rows], axis=1)).chart
+        straddling = is_mixed.copy()
+        for dj in (0, 1):
+            for di in (0, 1):
+                straddling |= owner[dj : dj + rows, di : di + columns] != chart
+        return needed, straddling & needed

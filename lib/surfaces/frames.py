@@ -1,0 +1,79 @@
+"""Points, unit normals and area densities of a surface of any kind, at places of its map.
+
+A mesh has the normals of its corners, interpolated (Phong), and rays leave it from where that smooth surface would
+be: each corner's tangent plane is asked where it passes above the place, and the answers are interpolated (Hanika
+2021).  Otherwise the facets of a round thing shade each other.
+"""
+
+import numpy as np
+
+from lib.nurbs import evaluate
+from lib.surfaces.domain import Domain
+from lib.surfaces.mesh import Mesh
+from lib.surfaces.trimmed import TrimmedSurface
+
+ONE_CHART = 0  # of a trimmed surface
+
+
+def domain_of(surface, cells):
+    """The Domain of a trimmed surface or a mesh with charts, `cells` of its finest lattice along u and v; None where
+    the whole square belongs to the surface."""
+    if isinstance(surface, Mesh):
+        return Domain(surface.uv, surface.chart, cells)
+    if isinstance(surface, TrimmedSurface) and not is_whole(surface):
+        from lib.surfaces.trim_mesh import domain_triangles  # here: a scene without trims need not load it
+
+        uv, F = domain_triangles(surface)
+        return Domain(uv[F], np.full(len(F), ONE_CHART), cells)
+    return None
+
+
+def is_whole(trim):
+    """True if the loops of a trimmed surface go round its whole box."""
+    if len(trim.loop_start) > 2:
+        return False
+    u, v = trim.uv.T
+    return abs(u @ np.roll(v, -1) - v @ np.roll(u, -1)) / 2 > 1 - 1e-9
+
+
+def whole(surface):
+    """The NURBS surface under a trimmed one; any other as it is."""
+    return surface.base if isinstance(surface, TrimmedSurface) else surface
+
+
+def frame(surface, uv, face=None):
+    """Points to send rays from and unit normals at uv (n, 2), in the triangles `face` (n,) of a mesh: S, N (n, 3)."""
+    if not isinstance(surface, Mesh):
+        return evaluate.frame(whole(surface), uv[:, 0], uv[:, 1])
+    weight = barycentric(surface.uv[face], uv)
+    corner, normal = surface.V[surface.F[face]], surface.N[face]
+    S = np.einsum("nk,nkc->nc", weight, corner)
+    N = np.einsum("nk,nkc->nc", weight, normal)
+    flat = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    length = np.linalg.norm(N, axis=1, keepdims=True)
+    flat /= np.maximum(np.linalg.norm(flat, axis=1, keepdims=True), 1e-300)
+    N = np.where(length > 1e-6, N / np.maximum(length, 1e-300), flat)
+    below = np.minimum(np.einsum("nkc,nkc->nk", S[:, None] - corner, normal), 0.0)
+    return S - np.einsum("nk,nkc->nc", weight * below, normal), N
+
+
+def density(surface, uv, face=None):
+    """Area of the surface over area of its map at uv (n, 2): (n,)."""
+    if not isinstance(surface, Mesh):
+        _, S_u, S_v = evaluate.evaluate(whole(surface), uv[:, 0], uv[:, 1])
+        return np.linalg.norm(np.cross(S_u, S_v), axis=1)
+    corner, place = surface.V[surface.F[face]], surface.uv[face]
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    e, f = place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]
+    return area / np.maximum(np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]), 1e-300)
+
+
+def barycentric(corner, uv):
+    """Weights (n, 3) of the corners (n, 3, 2) of triangles at uv (n, 2), at least 0, their sum 1."""
+    e, f, p = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0], uv - corner[:, 0]
+    double = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
+    double = np.where(np.abs(double) > 1e-300, double, 1e-300)
+    second = (p[:, 0] * f[:, 1] - p[:, 1] * f[:, 0]) / double
+    third = (e[:, 0] * p[:, 1] - e[:, 1] * p[:, 0]) / double
+    weight = np.maximum(np.stack([1 - second - third, second, third], axis=1), 0.0)
+    return weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
