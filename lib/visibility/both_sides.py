@@ -1,0 +1,193 @@
+"""Which open sheets get light on both sides: a small path tracing from places on them.
+
+From each place of each side, on arrival and after every reflection, some points of the lamps are asked for their light
+(next-event estimation).  A point stands for its triangle in the disc form of the form factor, cos cos A / (pi r^2 + A)
+(Wallace et al. 1989), which stays below 1 however near the lamp is.  The estimate is coarse; the question is only
+whether a side is dark.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lib.elements.lattice import OFFSET
+from lib.visibility.hemisphere import cosine_direction_each
+from lib.visibility.tracer import Tracer
+
+PLACES = 256  # of a side: light that enters a crack along the border reaches too few to count
+BOUNCES = 4
+SHADOW_RAYS = 4  # from a place and from every point of a path
+PATHS_AT_ONCE = 1 << 18
+DARK = 0.01
+
+
+def side_light(V, F, face_surface, E, rho, candidates, seed=0):
+    """Estimate the mean irradiance of both sides of some surfaces.
+
+    Parameters
+    ----------
+    V, F : (k, 3) positions in the scene's frame (its box has the side 1), (m, 3) triangles, front counterclockwise
+    face_surface : (m,) int, surface of each triangle
+    E : (n, 3) float64 exitance of surfaces, >= 0, of their front sides [W/m^2];  rho : (n,) reflectance, <= 1
+    candidates : indices of surfaces that may be lit on both sides.  Their backs reflect like their fronts; the backs
+        of all others swallow light
+
+    Returns
+    -------
+    (n, 2) float64 irradiance [W/m^2] of front and back, of the largest channel of E; 0 for surfaces that are no
+    candidates or have no triangles.
+
+    The order of surfaces does not matter, of triangles only that of each candidate's own.
+    """
+    V, F, face_surface = np.asarray(V, dtype=np.float64), np.asarray(F), np.asarray(face_surface)
+    power, candidates = np.asarray(E, dtype=np.float64).max(axis=1), np.asarray(candidates, dtype=np.int64)
+    light = np.zeros((len(power), 2))
+    order, sheets = _sheets(V, F, face_surface, candidates)
+    lamps = _lamps(V, F, face_surface, power)
+    if not len(order) or not len(lamps.share):
+        return light
+
+    is_candidate = np.zeros(len(power), dtype=bool)
+    is_candidate[candidates] = True
+    room = _Room(V, F, face_surface, np.asarray(rho, dtype=np.float64), is_candidate, lamps, Tracer(V, F))
+    rng = np.random.default_rng(seed)
+    at_once = max(1, PATHS_AT_ONCE // (2 * PLACES))
+    for first in range(0, len(order), at_once):
+        some = order[first : first + at_once]
+        place, N = _places(V, F, sheets, first, len(some), rng)
+        # Send as many paths from the front as from the back.
+        H = room.irradiance(np.concatenate([place, place]), np.concatenate([N, -N]), rng)
+        light[some] = H.reshape(2, len(some), PLACES).mean(axis=2).T
+    return light
+
+
+def is_two_sided(light, least=DARK):
+    """(n,) bool: surfaces with light on both sides, of `light` (n, 2) by side_light.
+
+    A side counts as dark if it gets less than `least` of what the other side gets, and also less than `least` of what
+    sheets usually get: the median of the brighter sides.  So a sheet in a dim room keeps both sides beside a bright
+    scene, and a lampshade keeps its outside.
+    """
+    dark, bright = np.min(light, axis=1), np.max(light, axis=1)
+    usual = np.median(bright[bright > 0]) if (bright > 0).any() else 0.0
+    return (dark > 0) & (dark >= least * np.minimum(bright, usual))
+
+
+@dataclass(frozen=True)
+class _Lamps:
+    """Emitting triangles: corner (k, 3, 3), unit normal (k, 3), area (k,), total power; share (k,) of it, summed up."""
+
+    corner: np.ndarray
+    normal: np.ndarray
+    area: np.ndarray
+    power: float
+    share: np.ndarray
+
+
+def _lamps(V, F, face_surface, power):
+    face = np.flatnonzero(power[face_surface] > 0) if len(F) else np.zeros(0, dtype=np.int64)
+    face = face[_by_place(V, F[face])]
+    corner = V[F[face]]
+    normal, area = _normals(corner)
+    emitted = np.cumsum(power[face_surface[face]] * area)
+    total = float(emitted[-1]) if len(emitted) else 0.0
+    if not total > 0:
+        face, corner, normal, area, emitted, total = face[:0], corner[:0], normal[:0], area[:0], emitted[:0], 1.0
+    return _Lamps(corner, normal, area, total, emitted / total)
+
+
+def _by_place(V, F):
+    """Order of triangles by the coordinates of their corners, whatever their numbers."""
+    return np.lexsort(V[F].reshape(-1, 9).T)
+
+
+def _normals(corner):
+    """Unit normals (k, 3), zero without an area, and areas (k,) of triangles with corners (k, 3, 3)."""
+    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    length = np.linalg.norm(cross, axis=1)
+    return cross / np.maximum(length, 1e-300)[:, None], length / 2
+
+
+def _sheets(V, F, face_surface, candidates):
+    """Candidates with an area in the order of their places (c,), and their faces (k,) with areas summed up, each
+    candidate's to 1: candidate i owns (i, i + 1].
+    """
+    face = np.flatnonzero(np.isin(face_surface, candidates))
+    area = _normals(V[F[face]])[1]
+    face, area = face[area > 0], area[area > 0]
+    surface, first, row = np.unique(face_surface[face], return_index=True, return_inverse=True)
+    order = _by_place(V, F[face[first]])
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order))
+    rank = rank[row.ravel()]
+    by_rank = np.argsort(rank, kind="stable")
+    face, area, rank = face[by_rank], area[by_rank], rank[by_rank]
+    share = area / np.bincount(rank, area, len(order))[rank] if len(rank) else area
+    return surface[order], (face, np.cumsum(share))
+
+
+def _places(V, F, sheets, first, n, rng):
+    """Points (n PLACES, 3) on candidates first to first + n, evenly by area, and their triangles' unit normals."""
+    face, share = sheets
+    t = np.arange(first, first + n)[:, None] + (np.arange(PLACES) + rng.random((n, PLACES))) / PLACES
+    corner = V[F[face[np.minimum(np.searchsorted(share, t.ravel()), len(face) - 1)]]]
+    return _points(corner, rng), _normals(corner)[0]
+
+
+def _points(corner, rng):
+    """A uniform point (k, 3) of each triangle (k, 3, 3)."""
+    a, b = rng.random((2, len(corner)))
+    over = a + b > 1
+    a, b = np.where(over, 1 - a, a)[:, None], np.where(over, 1 - b, b)[:, None]
+    return corner[:, 0] + a * (corner[:, 1] - corner[:, 0]) + b * (corner[:, 2] - corner[:, 0])
+
+
+@dataclass(frozen=True)
+class _Room:
+    """What paths travel in."""
+
+    V: np.ndarray
+    F: np.ndarray
+    face_surface: np.ndarray
+    rho: np.ndarray
+    is_candidate: np.ndarray
+    lamps: _Lamps
+    tracer: Tracer
+
+    def irradiance(self, x, N, rng):
+        """One estimate of the irradiance at each of x (m, 3), on the side of N (m, 3): (m,)."""
+        H, weight, path = np.zeros(len(x)), np.ones(len(x)), np.arange(len(x))
+        for bounce in range(BOUNCES + 1):
+            # Add the lamps' light at the path's end.
+            x = x + OFFSET * N
+            for _ in range(SHADOW_RAYS):
+                H[path] += weight * self._direct(x, N, rng) / SHADOW_RAYS
+            if bounce == BOUNCES or not len(path):
+                break
+
+            # Go on to what the path's end sees.
+            D = cosine_direction_each(N, rng.random((len(x), 2)))
+            hits = self.tracer.closest(x.astype(np.float32), D)
+            surface = self.face_surface[hits.face]
+            weight = weight * self.rho[surface]
+            goes_on = (hits.face >= 0) & (~hits.is_back | self.is_candidate[surface]) & (weight > 0)
+            hits, path, weight = hits[goes_on], path[goes_on], weight[goes_on]
+            corner = self.V[self.F[hits.face]]
+            a, b = hits.a[:, None].astype(np.float64), hits.b[:, None].astype(np.float64)
+            x = corner[:, 0] + a * (corner[:, 1] - corner[:, 0]) + b * (corner[:, 2] - corner[:, 0])
+            N = _normals(corner)[0] * np.where(hits.is_back, -1.0, 1.0)[:, None]
+        return H
+
+    def _direct(self, x, N, rng):
+        """Irradiance at x from one point of the lamps, chosen by their power."""
+        lamps = self.lamps
+        k = np.minimum(np.searchsorted(lamps.share, rng.random(len(x)), side="right"), len(lamps.share) - 1)
+        D = _points(lamps.corner[k], rng) - x
+        r2 = np.einsum("ij,ij->i", D, D)
+        leaving, arriving = np.einsum("ij,ij->i", N, D), -np.einsum("ij,ij->i", lamps.normal[k], D)
+        H = np.zeros(len(x))
+        seen = np.flatnonzero((leaving > 0) & (arriving > 0))
+        seen = seen[~self.tracer.is_blocked(x[seen].astype(np.float32), D[seen].astype(np.float32))]
+        cosines = leaving[seen] * arriving[seen] / r2[seen]
+        H[seen] = lamps.power * cosines / (np.pi * r2[seen] + lamps.area[k[seen]])
+        return H
