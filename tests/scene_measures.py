@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
-from lib.formats import scene_folder, scene_geometry, scene_import, scene_rules, scene_table
+from lib.formats import scene_model
 from lib.nurbs.evaluate import evaluate, evaluate_grid, frame
 
 SCENES = Path(__file__).parents[1] / "data" / "scenes"
@@ -18,12 +18,8 @@ GAUSS = np.polynomial.legendre.leggauss(8)  # exact for polynomials of degree 15
 @cache
 def load(name):
     """(settings, Scene) of a scene folder, as a bake reads it."""
-    folder = scene_folder.read(SCENES / name)
-    scene_rules.check(folder)
-    settings = folder.settings
-    placed, notes = scene_geometry.load(settings["geometry"], settings["units"], folder.folder, folder.file)
-    table = scene_table.resolve(settings, placed, folder.where)
-    return settings, scene_import.assemble(placed, notes, table, settings["up"])
+    model = scene_model.read(SCENES / name)
+    return model.settings, model.scene
 
 
 def surfaces(name, pattern):

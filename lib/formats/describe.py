@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lib.formats import geometry_file, scene_folder, scene_geometry, scene_import, scene_rules, scene_table
+from lib.formats import geometry_file, scene_model
 from lib.formats.scene_table import reflectance
 from lib.nurbs.shape import area, collapsed_sides, is_closed
 
@@ -27,14 +27,8 @@ def _file(path):
 
 
 def _folder(path):
-    source = scene_folder.read(path)
-    scene_rules.check(source)
-    settings = source.settings
-    placed, notes = scene_geometry.load(
-        settings["geometry"], settings["units"], source.folder, source.file, source.where
-    )
-    table = scene_table.resolve(settings, placed, source.where)
-    made = scene_import.assemble(placed, notes, table, settings["up"])
+    model = scene_model.read(path)
+    source, settings, placed, made = model.source, model.settings, model.placed, model.scene
     areas = {one.name: one.area for one in placed}
     head = f"{source.file}: {len(made.names)} surfaces, {sum(areas.values()):.4g} m2, units {settings['units']}"
     rows = [("surface", *_SHAPE, "role", "material", "light W")]

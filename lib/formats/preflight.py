@@ -131,7 +131,7 @@ def _make(given, overrides, home, key, absolute):
     """Import the scene, write its slices and the outcome."""
     from lib.formats import artefact, scene_check
 
-    found = scene_check.run(given, overrides)
+    found = scene_check.run(given, overrides, home / "pictures")
     slices, texts = {}, {home / "settings" / "folder.json": _text({"folder": str(absolute), "file": found.file})}
     for kind, content in found.slices.items():
         text = _text(content)

@@ -4,23 +4,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lib.elements.lattice import MOST_ROOTS, roots_of
-from lib.formats import (
-    geometry_file,
-    pictures,
-    scene,
-    scene_folder,
-    scene_geometry,
-    scene_import,
-    scene_rules,
-    scene_table,
-    settings,
-)
+from lib.formats import artefact, geometry_file, pictures, scene, scene_import, scene_model, scene_table, settings
 from lib.formats.mistakes import Mistakes
 from lib.maps.base_texture import rho_average
 from lib.maps.budget import gpu_bytes, smallest_total
-from lib.nurbs.shape import extent
 from lib.nurbs.tessellate import frame
 from lib.refusal import Refusal
+from lib.surfaces.measure import extent
 
 DIGITS = 4  # of an average reflectance: a repainted texture whose average moves less re-bakes nothing
 AUTO = "auto"  # the reconstruction of surfaces that ask for none
@@ -43,17 +33,17 @@ class Found:
     inputs: dict
 
 
-def run(folder, overrides=None):
-    """Check the scene in `folder` under `overrides` and return what was Found; Refusal lists what is wrong."""
-    source = scene_folder.read(folder, overrides)
-    scene_rules.check(source)
-    wanted = source.settings
-    placed, notes = scene_geometry.load(wanted["geometry"], wanted["units"], source.folder, source.file, source.where)
-    table = scene_table.resolve(wanted, placed, source.where)
-    made = scene_import.assemble(placed, notes, table, wanted["up"])
+def run(folder, overrides=None, pictures_folder=None):
+    """Check the scene in `folder` under `overrides` and return what was Found; Refusal lists what is wrong.
+
+    pictures_folder : where pictures embedded in geometry files are put, by their content
+    """
+    model = scene_model.read(folder, overrides)
+    source, wanted, placed, table, made = model.source, model.settings, model.placed, model.table, model.scene
     scene.check(made, source.file)
+    keep_pictures(model.pictures, pictures_folder)
     warnings = list(made.warnings)
-    textures, rho_avg = _reflectances(source, made, warnings)
+    textures, rho_avg = _reflectances(source, wanted, made, pictures_folder, warnings)
     digests = {name: geometry_file.digest(source.folder / name) for name in _geometry_files(wanted)}
     pictures_used = {row["file"]: geometry_file.digest(row["file"]) for row in textures.values()}
     resolved = settings.resolve(wanted, float(frame(made.surfaces)[1]))
@@ -81,7 +71,11 @@ def run(folder, overrides=None):
         "materials": {"rho_avg": rho_avg},
         "textures": {
             "textures": {
-                name: {**row, "file": materials[material]["texture"], "digest": pictures_used[row["file"]]}
+                name: {
+                    **row,
+                    "file": _relative(row["file"], materials[material]["texture"]),
+                    "digest": pictures_used[row["file"]],
+                }
                 for name, material in zip(made.names, made.material, strict=True)
                 if (row := textures.get(name))
             }
@@ -112,17 +106,31 @@ def _geometry_files(wanted):
     return sorted({entry["file"] for entry in wanted["geometry"] if "file" in entry})
 
 
-def _reflectances(source, made, warnings):
+def keep_pictures(found, folder):
+    """Put embedded pictures {KEY: bytes} into `folder`, where textures `embedded:KEY` are read from."""
+    for key, data in found.items() if folder is not None else ():
+        if not (Path(folder) / key).is_file():
+            with artefact.atomic(Path(folder) / key) as file:
+                file.write(data)
+
+
+def _relative(path, written):
+    return path if written.startswith("embedded:") else written
+
+
+def _reflectances(source, wanted, made, pictures_folder, warnings):
     """Textures {surface: {file, colour_space, repeat}} and average reflectances {surface: [r, g, b]}."""
     mistakes, textures, rho_avg, opened = Mistakes(), {}, {}, {}
-    materials = source.settings.get("materials", {})
+    materials = wanted.get("materials", {})
     for index, name in enumerate(made.names):
         material = materials.get(made.material[index], {})
         if "texture" not in material:
             rho_avg[name] = scene_table.reflectance(material)
             continue
+        embedded = material["texture"].startswith("embedded:")
+        folder = Path(pictures_folder or "") if embedded else source.folder
         row = {
-            "file": str(source.folder / material["texture"]),
+            "file": str(folder / material["texture"].removeprefix("embedded:")),
             "colour_space": material.get("colour_space", _colour_space(material["texture"])),
             "repeat": [float(n) for n in material.get("repeat", [1, 1])],
         }

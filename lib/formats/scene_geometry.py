@@ -1,7 +1,9 @@
-"""Geometry entries of a scene, inline or from files, as named NURBS surfaces in world metres."""
+"""Geometry entries of a scene, inline or from files, as named surfaces in world metres."""
 
-from dataclasses import dataclass
-from pathlib import Path
+import hashlib
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,54 +12,113 @@ from lib.formats.mistakes import Mistakes
 from lib.formats.patches import Patch
 from lib.formats.quantities import METRES
 from lib.formats.scene_rules import entry_name
-from lib.nurbs.shape import area, transformed
-from lib.nurbs.surface import NurbsSurface, bilinear, from_points
+from lib.nurbs.surface import bilinear, from_points
 from lib.refusal import Refusal, refusal
+from lib.surfaces.measure import area, hull, transformed
 
+TRIMMED = "keep"  # what happens to trimmed faces of a file
 FLAT = 1e-13  # area over squared size below which a surface is a line or a point: rounding of its coordinates
 
 
-@dataclass(frozen=True)
+UPRIGHT = {  # turns from a file's own up to the scene's
+    ("y", "z"): [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+    ("z", "y"): [[1, 0, 0], [0, 0, 1], [0, -1, 0]],
+}
+
+
+@dataclass(frozen=True, eq=False)
 class Placed:
     """One surface of the scene.
 
     name : its name;  object : name of the placed entry it belongs to;  entry : index of that entry
-    surface : NurbsSurface, world metres;  flip : the lit side is against S_u x S_v;  area : [m^2]
+    surface : of any kind, world metres;  flip : the lit side is against S_u x S_v;  area : [m^2]
+    material : name of the file's material, or None;  solid : as lib.formats.patches.Patch has it
+    part, M : the file's own surface and the map (4, 4) that made this one of it: copies share one
+    front : name of the surface whose back this is, or None
     """
 
     name: str
     object: str
     entry: int
-    surface: NurbsSurface
+    surface: object
     flip: bool
     area: float
+    material: str | None = None
+    solid: bool | None = None
+    part: object = None
+    M: np.ndarray | None = None
+    front: str | None = None
 
 
-def load(entries, units, folder, file, where=None):
-    """Read and place all geometry: (list of Placed in the entries' order, list of notes).
+class Loaded(NamedTuple):
+    """Surfaces in the entries' order, notes, and what files bring: materials {name: as in scene.yaml, with the texture
+    relative to the scene's folder, or "embedded:KEY"}, pictures {KEY: bytes}."""
+
+    placed: list
+    notes: list
+    materials: dict
+    pictures: dict
+
+
+@dataclass
+class _Brought:
+    """Materials and pictures of the files read so far, under names that differ where materials do."""
+
+    materials: dict = field(default_factory=dict)
+    pictures: dict = field(default_factory=dict)
+
+    def add(self, file, content):
+        """{name in the file: name in the scene} of the materials of a file."""
+        names_of, folder = {}, PurePosixPath(file).parent
+        for name, material in content.materials.items():
+            material = dict(material)
+            written = material.get("texture", "")
+            if written.startswith("embedded:"):
+                data = content.pictures[written.removeprefix("embedded:")]
+                key = hashlib.sha256(data).hexdigest()[:16]
+                self.pictures[key] = data
+                material["texture"] = f"embedded:{key}"
+            elif written:
+                material["texture"] = str(folder / written)
+            own = names.canonical(name) if names.complaint(name) is None else "material"
+            full, number = own, 1
+            while self.materials.get(full, material) != material:
+                number += 1
+                full = f"{own} ({number})"
+            self.materials[full] = material
+            names_of[name] = full
+        return names_of
+
+
+def load(entries, units, folder, file, where=None, up="z"):
+    """Read and place all geometry: Loaded.
 
     entries : geometry of scene.yaml;  units : the scene's unit
     folder : where files lie;  file : scene.yaml as messages name it
-    where : function of a path of keys to (file, line), or None
+    where : function of a path of keys to (file, line), or None;  up : the scene's, "y" or "z": files that state
+        theirs are turned
 
     Raises Refusal listing every mistake of all entries.
     """
     mistakes, notes, placed, contents, areas = Mistakes(), [], [], {}, {}
+    brought, named = _Brought(), {}
     where = where or (lambda path: (file, None))
     for index, entry in enumerate(entries):
         try:
             if "file" in entry:
-                key = (entry["file"], entry.get("only"), entry.get("trimmed", "refuse"))
+                key = (entry["file"], entry.get("only"), entry.get("trimmed", TRIMMED))
                 if key not in contents:
                     contents[key] = _read(entry, folder, file)
+                    named[key] = brought.add(entry["file"], contents[key])
                     notes += [f"{entry['file']}: {note}" for note in contents[key].notes]
                 parts, total = contents[key].patches, contents[key].total
+                turn = UPRIGHT.get((contents[key].up, up))
                 unit = METRES[entry["units"]] if "units" in entry else contents[key].metres
                 if unit is None and entry["file"].lower().endswith(".3dm"):
                     raise refusal("states no unit; say it with `units`", entry["file"], entry_name(entry), "units")
                 unit = METRES[units] if unit is None else unit
             else:
-                parts, total, unit = [Patch(0, inline(entry))], 0, METRES[units]
+                parts, total, unit, turn, key = [Patch(0, inline(entry))], 0, METRES[units], None, None
         except Refusal as error:
             for line in str(error).splitlines():
                 mistakes.add_text(line)
@@ -68,15 +129,16 @@ def load(entries, units, folder, file, where=None):
             mistakes.add(what, source, entry_name(entry), field, line)
             continue
         to_units = (unit / METRES[units], METRES[units])
-        placed += _placed(entry, index, parts, total, to_units, areas, mistakes, where)
+        own = (named.get(key, {}), np.eye(3) if turn is None else np.array(turn, dtype=np.float64))
+        placed += _placed(entry, index, parts, total, to_units, own, areas, mistakes, where)
     _check_names(placed, mistakes, where)
     mistakes.stop()
-    return placed, list(dict.fromkeys(notes))
+    return Loaded(placed, list(dict.fromkeys(notes)), brought.materials, brought.pictures)
 
 
 def _read(entry, folder, file):
     shown = str(Path(file).parent / entry["file"])
-    name, only, trimmed = entry_name(entry), entry.get("only"), entry.get("trimmed", "refuse")
+    name, only, trimmed = entry_name(entry), entry.get("only"), entry.get("trimmed", TRIMMED)
     return geometry_file.read(Path(folder) / entry["file"], shown, name, only, trimmed)
 
 
@@ -125,9 +187,10 @@ def _check_corners(corners):
         raise ValueError("quadrangle: the corners cross or are concave; expected a convex round trip of four corners")
 
 
-def _placed(entry, index, parts, total, to_units, areas, mistakes, where):
-    """Every copy of an entry's patches, in world metres; to_units = (file to scene, scene to metres)."""
-    to_scene, to_metres = to_units
+def _placed(entry, index, parts, total, to_units, own, areas, mistakes, where):
+    """Every copy of an entry's patches, in world metres; to_units = (file to scene, scene to metres), own = (names of
+    the file's materials, turn from its axes to the scene's)."""
+    (to_scene, to_metres), (material_of, turn) = to_units, own
     places = entry.get("place", {})
     places = places if isinstance(places, list) else [places]
     result = []
@@ -140,7 +203,7 @@ def _placed(entry, index, parts, total, to_units, areas, mistakes, where):
             source, line = where(("geometry", index, "place"))
             mistakes.add(what, source, name, field, line)
             continue
-        M[:3, :3] *= to_metres * to_scene
+        M[:3, :3] = M[:3, :3] @ turn * (to_metres * to_scene)
         M[:3, 3] *= to_metres
         mirrored = np.linalg.slogdet(M[:3, :3])[0] < 0
         for part in parts:
@@ -148,7 +211,8 @@ def _placed(entry, index, parts, total, to_units, areas, mistakes, where):
             made = _world(part.surface, M, full, index, areas, mistakes, where)
             if made is not None:
                 flip = bool(part.flip) ^ bool(mirrored) ^ bool(entry.get("flip", False))
-                result.append(Placed(full, name, index, made[0], flip, made[1]))
+                facts = (material_of.get(part.material), part.solid, part.surface, M)
+                result.append(Placed(full, name, index, made[0], flip, made[1], *facts))
     return result
 
 
@@ -161,7 +225,7 @@ def _world(part, M, name, index, areas, mistakes, where):
         field, _, what = str(error).partition(": ")
         mistakes.add(what, file, name, f"place ({field})", line)
         return None
-    P = surface.P.reshape(-1, 3)
+    P = hull(surface)
     size = float(np.ptp(P, axis=0).max())
     scale = _similarity(M)
     if not size > 0:

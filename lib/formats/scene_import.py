@@ -5,19 +5,38 @@ The slice is a JSON-able dict: units, up, geometry (entries as in scene.yaml, wi
 folder that moves, or is typed differently, re-bakes nothing.
 """
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from lib.formats import geometry_file, names, scene_geometry
 from lib.formats.scene import Scene
+from lib.nurbs import tessellate
 from lib.nurbs.coincident import coincident
+from lib.nurbs.surface import NurbsSurface
 from lib.refusal import refusal
+from lib.surfaces.measure import hull, transformed
+from lib.surfaces.mesh import Mesh
 
 GEOMETRY_KEYS = (
-    "name", "rectangle", "quadrangle", "triangle", "nurbs", "file", "units", "place", "only", "trimmed", "flip",
+    "name", "rectangle", "quadrangle", "triangle", "nurbs", "file", "units", "place", "only", "trimmed", "flip", "uv",
 )  # fmt: skip
-SURFACE_KEYS = ("role", "turn", "material", "E", "group", "is_black")  # not how finely it is refined or exported
+SURFACE_KEYS = (
+    "role",
+    "turn",
+    "material",
+    "E",
+    "group",
+    "is_black",
+    "front",
+)  # not how finely it is refined or exported
+FINEST = 1 / 1024  # of the scene's largest side: finest cell of a mesh's map
+MOST_CELLS = 64  # across a small mesh
+NO_LIGHT = (
+    "no surface emits light, every map will be black. Add to scene.yaml the line `light: studio` for a soft lamp"
+    " overhead, or let a material shine: under `materials:` a line like `NAME: {{lumens: 2000}}` (here are: {})"
+)
 MOST_TOLD = 8  # pairs of surfaces a warning names
 
 
@@ -44,8 +63,40 @@ def read(piece, folder, file):
         if not path.is_file() or geometry_file.digest(path) != digest:
             shown = Path(file).parent / written
             raise refusal("changed while the bake ran; start it again", file=shown)
-    placed, notes = scene_geometry.load(piece["geometry"], piece["units"], folder, file)
-    return assemble(placed, notes, piece["surfaces"], piece["up"])
+    placed, notes, *_ = scene_geometry.load(piece["geometry"], piece["units"], folder, file, up=piece["up"])
+    front = {one.name: one for one in placed}
+    for name, row in piece["surfaces"].items():
+        if row["front"] is not None:
+            one = front[row["front"]]
+            placed.append(replace(one, name=name, flip=not one.flip, front=one.name))
+    return assemble(with_charts(placed, piece["geometry"]), notes, piece["surfaces"], piece["up"])
+
+
+def with_charts(placed, entries):
+    """The placed surfaces with charts on their meshes: made once for all copies of one size, and for both sides.
+
+    A finest cell of a mesh's map is FINEST of the scene's largest side, less on meshes of less than MOST_CELLS of these
+    across.
+    """
+    meshes = [one for one in placed if isinstance(one.surface, Mesh)]
+    if not meshes:
+        return placed
+    from lib.surfaces import charts  # xatlas, for meshes alone
+
+    scale = tessellate.frame([one.surface for one in placed])[1]
+    made, out = {}, {}
+    for one in meshes:
+        size = float(np.cbrt(abs(np.linalg.det(one.M[:3, :3]))))
+        key = id(one.part), round(size, 12), entries[one.entry].get("uv", "charts")
+        if key not in made:
+            texel = min(FINEST * scale, np.sqrt(one.area) / MOST_CELLS) / size
+            own = charts.own_charts(one.part) if key[2] == "own" else None
+            made[key] = own or charts.charted(one.part, texel)
+        if one.front is None:
+            out[one.name] = transformed(made[key], one.M)
+    return [
+        replace(one, surface=out[one.front or one.name]) if isinstance(one.surface, Mesh) else one for one in placed
+    ]
 
 
 def assemble(placed, notes, table, up):
@@ -57,13 +108,17 @@ def assemble(placed, notes, table, up):
     groups = sorted({row["group"] for row, lit in zip(rows, emits, strict=True) if lit}) or [rows[0]["group"]]
     group = [groups.index(row["group"]) if lit else 0 for row, lit in zip(rows, emits, strict=True)]
     flip = np.array([one.flip ^ row["turn"] for one, row in zip(placed, rows, strict=True)], dtype=bool)
-    warnings = list(notes) + ([] if emits.any() else ["no surface emits light: every map will be black"])
+    warnings = list(notes) + (
+        [] if emits.any() else [NO_LIGHT.format(", ".join(sorted({r["material"] for r in rows})[:4]))]
+    )
     warnings += _coincident(placed, flip)
+    index = {one.name: k for k, one in enumerate(placed)}
+    front = np.array([-1 if one.front is None else index[one.front] for one in placed], dtype=np.int32)
     return Scene(
         names=[one.name for one in placed],
         files=names.numbered_stems([one.name for one in placed]),
         surfaces=[one.surface for one in placed],
-        front=np.full(len(placed), -1, dtype=np.int32),
+        front=front,
         flip=flip,
         role=[row["role"] for row in rows],
         E=E,
@@ -78,9 +133,11 @@ def assemble(placed, notes, table, up):
 
 def _coincident(placed, flip):
     """Warnings about surfaces that lie in one another, the first few by name."""
-    low = np.min([one.surface.P.min(axis=(0, 1)) for one in placed], axis=0)
-    high = np.max([one.surface.P.max(axis=(0, 1)) for one in placed], axis=0)
-    pairs = coincident([one.surface for one in placed], flip, float((high - low).max()))
+    low = np.min([hull(one.surface).min(axis=0) for one in placed], axis=0)
+    high = np.max([hull(one.surface).max(axis=0) for one in placed], axis=0)
+    whole = [k for k, one in enumerate(placed) if isinstance(one.surface, NurbsSurface)]
+    pairs = coincident([placed[k].surface for k in whole], flip[whole], float((high - low).max()))
+    pairs = [(whole[a], whole[b]) for a, b in pairs]
     told = [
         f"surfaces {placed[a].name} and {placed[b].name} lie in one another, lit on the same side: move one a little"
         for a, b in pairs[:MOST_TOLD]

@@ -31,10 +31,11 @@ def check(scene):
                 add(fault, ("materials", name, "texture"), field=f"materials.{name}.texture")
     known = [*materials, DEFAULT_MATERIAL]
     _check_geometry(scene, known, add)
-    for pattern, override in settings.get("surfaces", {}).items():
-        if override.get("material", DEFAULT_MATERIAL) not in known:
-            what = unknown_material(override["material"], known)
-            add(what, ("surfaces", pattern, "material"), field=f"surfaces.{pattern}.material")
+    if not any(brings_materials(entry) for entry in settings["geometry"]):  # else known when the files are read
+        for pattern, override in settings.get("surfaces", {}).items():
+            if override.get("material", DEFAULT_MATERIAL) not in known:
+                what = unknown_material(override["material"], known)
+                add(what, ("surfaces", pattern, "material"), field=f"surfaces.{pattern}.material")
     rays = settings["bake"]["shadow_rays"]
     if rays != "auto" and rays[0] > rays[1]:
         add(f"{rays}; expected [n0, n1] with n0 <= n1", ("bake", "shadow_rays"), field="bake.shadow_rays")
@@ -58,16 +59,21 @@ def _check_geometry(scene, known, add):
             line = scene.where(("geometry", first[name]))[1]
             add(f"two entries have this name, the first in line {line}; names are different", path, name, "name")
         first.setdefault(name, index)
-        if entry.get("material", DEFAULT_MATERIAL) not in known:
+        if entry.get("material", DEFAULT_MATERIAL) not in known and not brings_materials(entry):
             add(unknown_material(entry["material"], known), (*path, "material"), name, "material")
         if "file" in entry:
             fault = path_fault(scene.folder, entry["file"])
             if fault:
                 add(fault, (*path, "file"), name, "file")
             continue
-        for field in ("units", "only", "trimmed"):
+        for field in ("units", "only", "trimmed", "uv"):
             if field in entry:
                 add("is for entries with a `file`", (*path, field), name, field)
+
+
+def brings_materials(entry):
+    """Is the geometry entry a file of a kind that holds materials of its own?"""
+    return PurePosixPath(entry.get("file", "")).suffix.lower() not in ("", ".bpt", ".txt", ".json")
 
 
 def entry_name(entry):

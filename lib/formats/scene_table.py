@@ -4,28 +4,36 @@ import fnmatch
 import math
 
 from lib.formats.mistakes import Mistakes, listed, nearest
-from lib.formats.scene_rules import DEFAULT_MATERIAL
+from lib.formats.scene_rules import DEFAULT_MATERIAL, brings_materials, unknown_material
 
 REFLECTANCE = 0.7  # of a material that states neither a reflectance, a texture nor a light
 LUMENS_PER_WATT = 683.0  # of the green the eye sees best; luminance weights of linear Rec. 709
 LUMINANCE = (0.2126, 0.7152, 0.0722)
 MAIN_GROUP = "main"
-FIELDS = ("role", "reconstruction", "tolerance", "material")
+FIELDS = ("role", "reconstruction", "tolerance", "material", "two_sided")
 
 
-def resolve(settings, placed, where):
-    """Per surface name: role, reconstruction, tolerance (None: the scene's), turn, material, E, group, is_black.
+def resolve(settings, placed, where, strict=True):
+    """Per surface name: role, reconstruction, tolerance (None: the scene's), turn, two_sided, material, E, group,
+    is_black, front.
 
     settings : of a SceneFolder;  placed : list of scene_geometry.Placed;  where : function of a path to (file, line)
 
+    Materials that only a file may bring are looked up here.
     `turn` is the override's `flip`: it comes on top of what file, placement and entry say.
+    strict : a pattern that matches nothing is a mistake
     Raises Refusal for a pattern that matches no surface, and for a light too strong to be a number.
     """
     mistakes = Mistakes()
-    table = {one.name: _of_entry(settings["geometry"][one.entry]) for one in placed}
+    table = {one.name: _of_entry(settings["geometry"][one.entry], one) for one in placed}
+    known = [*settings.get("materials", {}), DEFAULT_MATERIAL]
     for pattern, override in settings.get("surfaces", {}).items():
         hit = [name for name in table if name == pattern or fnmatch.fnmatchcase(name, pattern)]
-        if not hit:
+        if override.get("material", DEFAULT_MATERIAL) not in known:
+            file, line = where(("surfaces", pattern, "material"))
+            what = unknown_material(override["material"], known)
+            mistakes.add(what, file, field=f"surfaces.{pattern}.material", line=line)
+        if strict and not hit:
             file, line = where(("surfaces", pattern))
             what = f"matches no surface{nearest(pattern, table) or '; there are ' + listed(table)}"
             mistakes.add(what, file, field=f"surfaces.{pattern}", line=line)
@@ -37,13 +45,15 @@ def resolve(settings, placed, where):
     return table
 
 
-def _of_entry(entry):
+def _of_entry(entry, one):
     return {
         "role": entry.get("role", "full"),
         "reconstruction": entry.get("reconstruction", "auto"),
         "tolerance": entry.get("tolerance"),
-        "material": entry.get("material", DEFAULT_MATERIAL),
+        "material": entry.get("material", one.material or DEFAULT_MATERIAL),
         "turn": False,
+        "two_sided": entry.get("two_sided", "auto" if brings_materials(entry) else False),
+        "front": one.front,
     }
 
 

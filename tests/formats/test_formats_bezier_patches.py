@@ -123,4 +123,4 @@ def test_files_that_are_none_are_refused_before_reading(tmp_path):
     assert "is empty" in refused(write(tmp_path, ""))
     (tmp_path / "a.bpt").write_bytes(b"\xff\xfe\x00")
     assert "is not text in UTF-8" in refused(tmp_path / "a.bpt")
-    assert "files of kind '.obj' are not read; allowed: .bpt" in refused(write(tmp_path, "v 0 0 0", "a.obj"))
+    assert "files of kind '.dwg' are not read; allowed: .bpt" in refused(write(tmp_path, "v 0 0 0", "a.dwg"))

@@ -1,0 +1,40 @@
+"""Which of a scene's open sheets get light on both sides."""
+
+import numpy as np
+
+from lib.formats.scene_table import REFLECTANCE
+from lib.surfaces.closed import in_closed_shell
+from lib.surfaces.coarse import coarse
+from lib.surfaces.mesh import Mesh
+from lib.visibility.both_sides import is_two_sided, side_light
+
+CLOSED = 0.9  # share of a surface's triangles in closed shells from which it is no open sheet
+
+
+def lit_on_both_sides(placed, table, asked):
+    """Those of the surfaces `asked` (indices into placed, a list of Placed) that have light on both sides.
+
+    table : rows of scene_table
+    """
+    parts = [coarse(one.surface) for one in placed]
+    start = np.cumsum([0, *(len(V) for V, _ in parts)])
+    V = np.concatenate([V for V, _ in parts])
+    F = np.concatenate(
+        [(F if not one.flip else F[:, ::-1]) + s for (_, F), one, s in zip(parts, placed, start, strict=False)]
+    )
+    surface = np.repeat(np.arange(len(placed)), [len(F) for _, F in parts])
+    turned = np.array([table[one.name]["turn"] for one in placed], dtype=bool)
+    F[turned[surface]] = F[turned[surface]][:, ::-1]
+    is_mesh = np.array([isinstance(one.surface, Mesh) for one in placed])
+    shut = np.bincount(surface, in_closed_shell(V, F), len(placed)) / np.maximum(
+        np.bincount(surface, None, len(placed)), 1
+    )
+    asked = [k for k in asked if not (is_mesh[k] and shut[k] >= CLOSED)]
+    if not asked:
+        return []
+    low, high = V.min(axis=0), V.max(axis=0)
+    V = (V - (low + high) / 2) / max(float((high - low).max()), 1e-300)
+    E = np.array([table[one.name]["E"] for one in placed], dtype=np.float64)
+    rho = np.where([table[one.name]["is_black"] for one in placed], 0.0, REFLECTANCE)
+    light = side_light(V, F, surface, E, rho, np.array(asked))
+    return [k for k in asked if is_two_sided(light)[k]]

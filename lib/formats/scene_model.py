@@ -1,0 +1,100 @@
+"""A scene folder read in full, the same way by all who need it: settings, surfaces, what each is for.
+
+What the settings leave to the geometry is decided here: materials that files bring, a studio lamp, and which open
+sheets get light on both sides.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from lib.formats import scene_folder, scene_geometry, scene_import, scene_rules, scene_table
+from lib.formats.quantities import METRES
+from lib.surfaces.measure import points
+
+STUDIO = "studio light"
+STUDIO_WIDTH, STUDIO_HEIGHT = 1.5, 0.75  # of the model's largest side: the lamp's side, and its height above the model
+STUDIO_EMISSION = 10.0  # W/m2 a channel
+BACK = "back"  # name of the surface on the other side of x: x/back
+
+
+@dataclass(frozen=True)
+class Model:
+    """source : SceneFolder; settings : its settings, with the files' materials and what was decided here filled in;
+    placed : list of Placed;  table : rows of scene_table;  scene : Scene;  pictures : {KEY: bytes} embedded in files
+    """
+
+    source: object
+    settings: dict
+    placed: list
+    table: dict
+    scene: object
+    pictures: dict
+
+
+def read(folder, overrides=None):
+    """Read the scene in `folder`; Refusal lists what is wrong."""
+    source = scene_folder.read(folder, overrides)
+    scene_rules.check(source)
+    settings = dict(source.settings)
+    where = source.where
+
+    def load(entries):
+        return scene_geometry.load(entries, settings["units"], source.folder, source.file, where, settings["up"])
+
+    placed, notes, brought, pictures = load(settings["geometry"])
+    settings["materials"] = {**brought, **settings.get("materials", {})}
+    if settings.get("light") == "studio":
+        entry = studio(placed, settings["units"], settings["up"])
+        index = len(settings["geometry"])
+        settings["geometry"] = [*settings["geometry"], entry]
+        settings["materials"] = {STUDIO: {"emission": STUDIO_EMISSION}, **settings["materials"]}
+        placed = placed + [replace(one, entry=index) for one in load([entry]).placed]
+    table = scene_table.resolve(settings, placed, where, strict=False)
+    backs = with_backs(placed, both_sides(placed, table))
+    table = scene_table.resolve(settings, backs, where)
+    made = scene_import.assemble(backs, notes, table, settings["up"])
+    return Model(source, settings, backs, table, made, pictures)
+
+
+def studio(placed, units, up):
+    """The geometry entry of the lamp of `light: studio`: a square above everything, facing down."""
+    S = np.concatenate([points(one.surface) for one in placed]) / METRES[units]
+    low, high = S.min(axis=0), S.max(axis=0)
+    size = float((high - low).max())
+    across = [0, 1] if up == "z" else [2, 0]  # u x v points up; the lamp's sides are given the other way round
+    origin, u, v = (low + high) / 2, np.zeros(3), np.zeros(3)
+    origin[2 if up == "z" else 1] = high[2 if up == "z" else 1] + STUDIO_HEIGHT * size
+    u[across[1]] = v[across[0]] = STUDIO_WIDTH * size
+    origin = origin - (u + v) / 2
+    return {
+        "name": STUDIO,
+        "rectangle": {"origin": origin.tolist(), "u": u.tolist(), "v": v.tolist()},
+        "material": STUDIO,
+    }
+
+
+def both_sides(placed, table):
+    """Names of the surfaces that are lit on both sides: those said to be, and open sheets where it turns out so."""
+    said = {one.name for one in placed if table[one.name]["two_sided"] is True}
+    asked = [k for k, one in enumerate(placed) if table[one.name]["two_sided"] == "auto" and may_be_open(one, table)]
+    if not asked or not any(max(row["E"]) > 0 for row in table.values()):
+        return said
+    from lib.formats.open_sheets import lit_on_both_sides  # rays, which few scenes need while they are read
+
+    return said | {placed[k].name for k in lit_on_both_sides(placed, table, asked)}
+
+
+def may_be_open(one, table):
+    """Could this surface have light on both sides?  Not part of a solid, reflects, and shines not."""
+    row = table[one.name]
+    return not one.solid and row["role"] == "full" and not row["is_black"] and max(row["E"]) == 0
+
+
+def with_backs(placed, both):
+    """The surfaces and, for those whose names are in `both`, their other sides."""
+    out = list(placed)
+    for one in placed:
+        if one.name in both:
+            out.append(replace(one, name=f"{one.name}/{BACK}", flip=not one.flip, front=one.name))
+    return out
