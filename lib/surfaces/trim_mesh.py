@@ -1,13 +1,58 @@
-"""Constrained Delaunay triangulation of trimmed surfaces in their (u, v).  The one importer of pythoncdt."""
+"""Triangles of a trimmed surface: constrained Delaunay in its (u, v), the border points as given, the inside exact.
+
+(u, v) are scaled so that triangles are long where the surface is straight and as wide as tall where it is flat.  Which
+border points there are is decided by the caller, for all surfaces that share them; if with these the loops cross,
+collapse, or stand too far off, `Unfit` names the border points whose edges need more.  The one importer of pythoncdt.
+"""
+
+from dataclasses import dataclass
 
 import numpy as np
 import pythoncdt
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
-from lib.surfaces.loops import following
+from lib.nurbs.evaluate import evaluate
+from lib.nurbs.facets import Patch, normals
+from lib.surfaces.loops import following, inside_loops
+from lib.surfaces.trim_flat import without_flat
+from lib.surfaces.trim_nodes import creases, nodes
 from lib.surfaces.trimmed import TrimmedSurface
 
 NOT_ALLOWED = pythoncdt.IntersectingConstraintEdges.NOT_ALLOWED
 TRY_RESOLVE = pythoncdt.IntersectingConstraintEdges.TRY_RESOLVE
+LEAST_SHARE = 0.3  # of its area that a loop keeps
+ROUNDS = 12  # of measuring and putting points where a triangle is too far off
+BESIDE = 1.2  # of the distance at its border edges that a triangle may have inside
+PATIENCE, LITTLE = 3, 0.7  # rounds after which the area too far off must fall by so much in each
+MANY = 300  # triangles; with more, fewer samples in each tell the distance
+NOTHING = 1e-14  # of the whole: a region smaller than this is rounding's
+AT_ONCE = 1_000_000  # pairs of edges compared
+
+
+class Unfit(ValueError):
+    """These border points do not do: `points`, indices into the surface's border, are on the edges that need more."""
+
+    def __init__(self, points):
+        super().__init__(f"border points {points[:8]}")
+        self.points = points
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Lines u, v (ascending, 0 and 1 among them) whose crossings are vertices, those of them along kinks, and the
+    factors (2,) that make a step as long as another.
+    """
+
+    u: np.ndarray
+    v: np.ndarray
+    kinks: tuple
+    scale: np.ndarray
+
+
+def scales(n_u, n_v, extent):
+    """Factors (2,) of u and v: steps where the surface is curved, lengths where it is straight both ways."""
+    return np.maximum(np.array([n_u, n_v]) - 1.0, 0.0) + np.asarray(extent) / max(extent)
 
 
 def domain_triangles(trim: TrimmedSurface):
@@ -15,27 +60,325 @@ def domain_triangles(trim: TrimmedSurface):
     clockwise in (u, v).  Where loops cross, points of crossing are added after those of the border.
     """
     edges = np.stack([np.arange(len(trim.uv)), following(trim.loop_start)], axis=1)
-    return triangles(trim.uv, edges, TRY_RESOLVE)
+    try:
+        return trim.uv, _inside(trim.uv, edges, np.empty((0, 2), dtype=np.int64))
+    except RuntimeError:
+        return _crossed(trim.uv, edges)
 
 
-def triangles(points, edges, crossing=NOT_ALLOWED):
-    """Constrained Delaunay triangles of `points` (k, 2) inside the closed loops of `edges` (e, 2), holes left out.
+def _made(points, edges, crossing):
+    """Constrained Delaunay triangulation of different points (k, 2) with the edges (e, 2)."""
+    made = pythoncdt.Triangulation(pythoncdt.VertexInsertionOrder.AUTO, crossing, 0.0)
+    made.insert_vertices(np.ascontiguousarray(points))
+    made.insert_edges(np.ascontiguousarray(edges, dtype=np.uint32))
+    return made
 
-    Returns points (k', 2), the given ones first, and F (m, 3) int64 counterclockwise.  Points in one place become
-    the first of them.  RuntimeError where edges cross and `crossing` does not allow it.
-    """
-    own, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
+
+def _distinct(points):
+    """(first (d,), number (k,)): the rows of points (k, 2) that are new, ascending, and which of them each equals."""
+    _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
     order = np.argsort(first)
     place = np.empty_like(order)
-    place[order] = np.arange(len(order))  # in the order given, so that the triangles do not depend on where u = 0 is
-    edges = place[number.ravel()[edges]]
-    edges = edges[edges[:, 0] != edges[:, 1]]
-    made = pythoncdt.Triangulation(pythoncdt.VertexInsertionOrder.AUTO, crossing, 0.0)
-    made.insert_vertices(np.ascontiguousarray(own[order]))
-    made.insert_edges(np.ascontiguousarray(edges, dtype=np.uint32))
+    place[order] = np.arange(len(order))
+    return first[order], place[number.ravel()]
+
+
+def _inside(points, edges, more):
+    """Triangles (m, 3) of `points` inside the loops of `edges`, with `more` edges; RuntimeError where edges cross."""
+    first, number = _distinct(points)
+    loops, more = number[edges], number[more]
+    loops = loops[loops[:, 0] != loops[:, 1]]
+    made = _made(points[first], np.concatenate([loops, more[more[:, 0] != more[:, 1]]]), NOT_ALLOWED)
+    made.erase_super_triangle()
+    F = made.triangles_array()["vertices"].astype(np.int64)
+    return first[F[_in_loops(points[first], F, loops)]]
+
+
+def _in_loops(points, F, loops):
+    """(m,) bool: triangles F inside the loops, told by one triangle of each region between them.
+
+    An edge that loops use twice, there and back, is no border.
+    """
+    n = len(points)
+    key, uses = np.unique(np.sort(loops, axis=1) @ [n, 1], return_counts=True)
+    ends = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1) @ [n, 1]
+    edge, number = np.unique(ends, return_inverse=True)
+    is_open = ~np.isin(edge, key[uses % 2 == 1])[number]
+    face = np.repeat(np.arange(len(F)), 3)[is_open]
+    size = len(F) + len(edge)
+    graph = coo_array((np.ones(len(face), dtype=np.int8), (face, len(F) + number[is_open])), shape=(size, size))
+    region = connected_components(graph, directed=False)[1][: len(F)]
+    area = _signed2(*(points[F[:, k]] for k in range(3)))
+    order = np.argsort(-area, kind="stable")
+    number, first = np.unique(region[order], return_index=True)
+    largest = order[first]
+    A, B = points[loops[:, 0]], points[loops[:, 1]]
+    within = inside_loops(A, B, points[F[largest]].mean(axis=1)) & (area[largest] > NOTHING * area.sum())
+    return within[np.searchsorted(number, region)]
+
+
+def _crossed(points, edges):
+    """Points and triangles inside loops that cross, the places of crossing added as points."""
+    first, number = _distinct(points)
+    loops = number[edges]
+    made = _made(points[first], loops[loops[:, 0] != loops[:, 1]], TRY_RESOLVE)
     made.erase_outer_triangles_and_holes()
     F = made.triangles_array()["vertices"].astype(np.int64)
     found = made.vertices_array()
-    extra = np.stack([found["x"], found["y"]], axis=1)[len(own) :]
-    number = np.concatenate([first[order], len(points) + np.arange(len(extra))])
-    return np.concatenate([points, extra]), number[F]
+    extra = np.stack([found["x"], found["y"]], axis=1)[len(first) :]
+    return np.concatenate([points, extra]), np.concatenate([first, len(points) + np.arange(len(extra))])[F]
+
+
+def triangulate(trim, keep, lines, tolerance, rounds=ROUNDS, is_last=False):
+    """The Patch of a TrimmedSurface with its border points `keep` (k,) bool, within the tolerance if possible.
+
+    lines : Lines;  rounds : how often points may be added inside;  is_last : do without what the border lacks
+    `side` of the Patch is one array of vertices for each run of border points from corner to corner.
+
+    Raises Unfit unless is_last.
+    """
+    border, after = _kept_loops(trim, keep, is_last)
+    border, uv, S, edges = _with_poles(trim, border, after, lines)
+    if not is_last:
+        _check_areas(trim, border, uv, edges)
+    uv = np.concatenate([uv, nodes(uv[edges[:, 0]], uv[edges[:, 1]], lines.u, lines.v)])
+    worst = np.inf
+    for turn in range(rounds + 1):
+        F, uv = _triangles(trim, border, uv, edges, lines, is_last)
+        S = np.concatenate([S, evaluate(trim.base, *np.clip(uv[len(S) :], 0, 1).T)[0]])
+        F = without_flat(S, F, edges)
+        measured = _measured(trim.base, S, uv, F)
+        at_border = _at_border(measured, F, edges, len(S))
+        if turn == 0 and not is_last and (at_border > tolerance).any():
+            raise Unfit(_real(border, _border_ends(F[at_border > tolerance], edges, len(S))))
+        failing = measured.height > np.maximum(tolerance, BESIDE * at_border)
+        excess = measured.area_of[failing].sum()
+        if not excess or turn == rounds or (turn > PATIENCE and excess > LITTLE * worst):
+            break
+        worst = min(worst, excess)
+        uv = np.concatenate([uv, _between(uv * lines.scale, F[failing], edges) / lines.scale])
+    return _patch(trim, keep, border, S, uv, F, measured)
+
+
+def _kept_loops(trim, keep, is_last):
+    """Kept border points (b,) and the next of each (b,), places in this list."""
+    border, after = [], []
+    for a, b in zip(trim.loop_start[:-1], trim.loop_start[1:], strict=True):
+        own = a + np.flatnonzero(keep[a:b])
+        if len(own) < 3 and not (trim.S[own] == trim.S[np.roll(own, -1)]).all(axis=1).any():
+            if not is_last:
+                raise Unfit(np.arange(a, b))
+        count = sum(map(len, border))
+        border.append(own)
+        after.append(count + np.roll(np.arange(len(own)), -1))
+    return np.concatenate(border), np.concatenate(after)
+
+
+def _with_poles(trim, border, after, lines):
+    """The border with vertices put along collapsed sides, where one step of it stays in one place: at the middle of
+    the lines that end there, so that texture coordinates interpolate as they should.
+
+    Returns border (b,) with -1 for these, uv (b, 2), S (b, 3), edges (b, 2).
+    """
+    uv, S = trim.uv[border], trim.S[border]
+    start, end = np.arange(len(border)), after.copy()
+    still = np.flatnonzero((S == S[after]).all(axis=1) & (uv != uv[after]).any(axis=1))
+    for k in still:
+        d = int(np.argmax(np.abs(uv[after[k]] - uv[k])))
+        t = (lines.u, lines.v)[d]
+        t = (t[1:] + t[:-1]) / 2
+        low, high = sorted((uv[k, d], uv[after[k], d]))
+        t = t[(t > low) & (t < high)]
+        if not t.size:
+            continue
+        t = t if uv[k, d] == low else t[::-1]
+        new = np.tile(uv[k], (t.size, 1))
+        new[:, d] = t
+        new[:, 1 - d] += (t - uv[k, d]) / (uv[after[k], d] - uv[k, d]) * (uv[after[k], 1 - d] - uv[k, 1 - d])
+        chain = len(uv) + np.arange(t.size)
+        uv, S = np.concatenate([uv, new]), np.concatenate([S, np.repeat(S[k][None], t.size, axis=0)])
+        start, end = np.concatenate([start, chain]), np.concatenate([end, chain[1:], [after[k]]])
+        end[k] = chain[0]
+    border = np.concatenate([border, np.full(len(uv) - len(border), -1)])
+    return border, uv, S, np.stack([start, end], axis=1)
+
+
+def _check_areas(trim, border, uv, edges):
+    """Unfit with the points of loops that lose most of their area or turn over."""
+    whole = _signed(trim.uv, trim.uv[following(trim.loop_start)])
+    part = _signed(uv[edges[:, 0]], uv[edges[:, 1]])
+    loop = np.searchsorted(trim.loop_start, np.arange(len(trim.uv)), side="right") - 1
+    whole = np.bincount(loop, whole)
+    owner = loop[border[edges[:, 0]]]
+    inserted = border[edges[:, 0]] < 0
+    for k in np.flatnonzero(inserted):  # a pole's vertices follow a border point of the same loop
+        owner[k] = owner[np.flatnonzero(edges[:, 1] == k)[0]]
+    part = np.bincount(owner, part, minlength=len(whole))
+    lost = np.flatnonzero(part / np.where(whole == 0, 1.0, whole) < LEAST_SHARE)
+    if lost.size:
+        raise Unfit(np.flatnonzero(np.isin(loop, lost)))
+
+
+def _signed(A, B):
+    """Twice the area swept by A-B (e, 2) seen from the middle of the box, counterclockwise."""
+    A, B = A - 0.5, B - 0.5
+    return A[:, 0] * B[:, 1] - A[:, 1] * B[:, 0]
+
+
+def _triangles(trim, border, uv, edges, lines, is_last):
+    """Triangles (m, 3) of the points and the points, more of them where loops cross and this is the last resort."""
+    more = creases(uv, uv[edges[:, 0]], uv[edges[:, 1]], lines.kinks)
+    try:
+        F = _inside(uv * lines.scale, edges, more)
+    except RuntimeError:
+        own = crossing(uv[edges[:, 0]], uv[edges[:, 1]])
+        if own.size and not is_last:
+            raise Unfit(_real(border, edges[own].ravel())) from None
+        if is_last:
+            points, F = _crossed(uv * lines.scale, edges)
+            return F, np.concatenate([uv, (points / lines.scale)[len(uv) :]])
+        F = _inside(uv * lines.scale, edges, more[:0])
+    A, B, C = (uv[F[:, k]] for k in range(3))
+    found, expected = _signed2(A, B, C).sum(), _signed(uv[edges[:, 0]], uv[edges[:, 1]]).sum()
+    if abs(found - expected) > 1e-6 * abs(expected) and not is_last:  # a hole that came to lie outside
+        raise Unfit(_real(border, np.arange(len(border))))
+    return F, uv
+
+
+def _signed2(A, B, C):
+    """Twice the area of triangles in the plane."""
+    return (B[:, 0] - A[:, 0]) * (C[:, 1] - A[:, 1]) - (B[:, 1] - A[:, 1]) * (C[:, 0] - A[:, 0])
+
+
+def _real(border, rows):
+    rows = border[np.unique(rows)]
+    return rows[rows >= 0]
+
+
+def crossing(A, B):
+    """Indices of the segments A-B (e, 2) that cross or touch another one but at a common end."""
+    out = []
+    step = max(1, AT_ONCE // max(len(A), 1))
+    for first in range(0, len(A), step):
+        a, b = A[first : first + step, None], B[first : first + step, None]
+        sides = [np.sign(_turn(*three)) for three in ((a, b, A), (a, b, B), (A, B, a), (A, B, b))]
+        meets = (sides[0] * sides[1] <= 0) & (sides[2] * sides[3] <= 0) & ~((sides[0] == 0) & (sides[1] == 0))
+        shares = [(x == y).all(axis=2) for x in (a, b) for y in (A, B)]
+        i, j = np.nonzero(meets & ~np.logical_or.reduce(shares))
+        out += [first + i, j]
+    return np.unique(np.concatenate(out))
+
+
+def _turn(a, b, c):
+    return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0])
+
+
+def _between(x, F, edges):
+    """New points (n, 2) for triangles F (m, 3) of points x (k, 2): the middle of the longest edge that is no border,
+    or of the triangle.
+    """
+    ends = np.stack([F, np.roll(F, -1, axis=1)], axis=-1)
+    length = np.linalg.norm(x[ends[..., 1]] - x[ends[..., 0]], axis=-1)
+    length[_is_border(F, edges, len(x))] = -1.0
+    k = np.argmax(length, axis=1)
+    row = np.arange(len(F))
+    new = np.where((length[row, k] < 0)[:, None], x[F].mean(axis=1), x[ends[row, k]].mean(axis=1))
+    return np.unique(new, axis=0)
+
+
+@dataclass(frozen=True)
+class _Measured:
+    height: np.ndarray  # (m,) largest distance from each facet's plane
+    on_edge: np.ndarray  # (m, 3) that of the samples on the edge from corner k to the next
+    area_of: np.ndarray  # (m,)
+    square: float  # mean, weighted by area
+    slide: float
+
+
+def _samples(n):
+    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
+    w = np.stack([i, j, n - i - j], axis=-1).reshape(-1, 3)
+    return w[(w >= 0).all(axis=1) & (w < n).all(axis=1)] / n
+
+
+FEW_SAMPLES, MANY_SAMPLES = np.concatenate([_samples(2), _samples(3)]), _samples(4)
+
+
+def _measured(base, S, uv, F):
+    """How far the exact surface is from the triangles, at samples of each."""
+    weights = MANY_SAMPLES if len(F) <= MANY else FEW_SAMPLES
+    at = np.clip(np.einsum("qk,mkc->mqc", weights, uv[F]), 0.0, 1.0).reshape(-1, 2)
+    off = evaluate(base, at[:, 0], at[:, 1])[0].reshape(len(F), -1, 3) - np.einsum("qk,mkc->mqc", weights, S[F])
+    normal, area = normals(*(S[F[:, k]] for k in range(3)))
+    height = np.abs(np.einsum("mqc,mc->mq", off, normal))
+    on_edge = np.stack([height[:, weights[:, (k + 2) % 3] == 0].max(axis=1) for k in range(3)], axis=1)
+    square = float((height**2).mean(axis=1) @ area) / max(float(area.sum()), 1e-300)
+    slide = float(np.linalg.norm(off, axis=2).max(initial=0.0))
+    return _Measured(height.max(axis=1), on_edge, area, square, slide)
+
+
+def _is_border(F, edges, n):
+    """(m, 3) bool: the edge from corner k to the next is one of `edges`, of n points."""
+    key = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=-1), axis=-1) @ [n, 1]
+    return np.isin(key, np.sort(edges, axis=1) @ [n, 1])
+
+
+def _at_border(measured, F, edges, n):
+    """(m,) largest distance of each triangle's samples on border edges: no point inside can change it."""
+    return np.where(_is_border(F, edges, n), measured.on_edge, 0.0).max(axis=1)
+
+
+def _border_ends(F, edges, n):
+    is_border = _is_border(F, edges, n)
+    return np.concatenate([F[is_border], np.roll(F, -1, axis=1)[is_border]])
+
+
+def _patch(trim, keep, border, S, uv, F, measured):
+    """The Patch of the vertices that triangles use or that lie on the border."""
+    used = np.zeros(len(S), dtype=bool)
+    used[F.ravel()] = True
+    used[: len(border)] |= border >= 0
+    number = np.cumsum(used) - 1
+    vertex = np.full(len(trim.uv), -1, dtype=np.int64)
+    vertex[border[border >= 0]] = number[np.flatnonzero(border >= 0)]
+    distance = max(float(measured.height.max(initial=0.0)), border_distance(trim, keep))
+    return Patch(
+        S[used],
+        np.clip(uv[used], 0.0, 1.0),
+        number[F],
+        sides(trim, vertex),
+        distance,
+        measured.square,
+        measured.slide,
+        float(measured.area_of.sum()),
+    )
+
+
+def sides(trim, vertex):
+    """Vertices along each run of the border from corner to corner, where `vertex` (k,) is -1 at points not kept."""
+    out = []
+    for a, b in zip(trim.loop_start[:-1], trim.loop_start[1:], strict=True):
+        corner = np.flatnonzero(np.isinf(trim.significance[a:b]))
+        corner = corner if corner.size else np.array([0])
+        loop = np.roll(vertex[a:b], -corner[0])
+        bounds = np.append(corner - corner[0], b - a)
+        loop = np.append(loop, loop[0])
+        runs = [loop[i : j + 1] for i, j in zip(bounds[:-1], bounds[1:], strict=True)]
+        out += [run[run >= 0] for run in runs]
+    return tuple(out)
+
+
+def border_distance(trim, keep):
+    """The largest distance of border points from the chords between those kept."""
+    largest = 0.0
+    for a, b in zip(trim.loop_start[:-1], trim.loop_start[1:], strict=True):
+        own = np.flatnonzero(keep[a:b])
+        if not own.size:
+            continue
+        rest = np.flatnonzero(~keep[a:b])
+        after = np.searchsorted(own, rest)
+        p, q = trim.S[a + own[after - 1]], trim.S[a + own[after % own.size]]
+        along, off = q - p, trim.S[a + rest] - p
+        t = np.clip((off * along).sum(axis=1) / np.maximum((along**2).sum(axis=1), 1e-300), 0.0, 1.0)
+        largest = max(largest, float(np.linalg.norm(off - t[:, None] * along, axis=1).max(initial=0.0)))
+    return largest
