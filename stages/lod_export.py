@@ -20,8 +20,8 @@ from lib import door
 from lib.formats import casters, lod_mesh, scene, textured_maps
 from lib.formats.quantities import METRES, metres
 from lib.lod.levels import DEVIATION, Scene, TooFine
-from lib.nurbs import tessellate
 from lib.refusal import refusal
+from lib.surfaces import tessellate
 
 
 def arguments(parser):

@@ -13,8 +13,8 @@ import numpy as np
 
 from lib import door
 from lib.formats import casters, scene
-from lib.nurbs import tessellate
 from lib.refusal import refusal
+from lib.surfaces import tessellate
 from lib.surfaces.closed import in_closed_shell
 
 SAG, OWN_SAG = 1e-3, 2e-3  # of the frame; of the surface's own size
@@ -49,10 +49,9 @@ def make(surfaces, flip, role, sag):
     surfaces = tessellate.into_frame(surfaces, centre, scale)
     known = tessellate.shapes(surfaces, blocks)
     size = known.extent.max(axis=1)
-    patches = tessellate.cut_within(
-        surfaces, known, tessellate.plan(surfaces, known), np.minimum(sag, OWN_SAG * size), tessellate.SLIDE * size
-    )
-    mesh = tessellate.assemble(patches, known)
+    pieces = tessellate.Pieces(surfaces, known)
+    patches = pieces.cut_within(np.minimum(sag, OWN_SAG * size), tessellate.SLIDE * size)
+    mesh = tessellate.assemble(patches, surfaces, known)
     F, face_surface = mesh.F.copy(), np.repeat(np.arange(len(surfaces), dtype=np.int32), np.diff(mesh.face_start))
     F[np.asarray(flip, dtype=bool)[face_surface]] = F[np.asarray(flip, dtype=bool)[face_surface]][:, ::-1]
     keep = blocks[face_surface]

@@ -1,8 +1,8 @@
-"""Levels of detail of a NURBS scene: each is cut anew from the exact surfaces, by chord tolerance or by triangle count.
+"""Levels of detail of a scene: each is cut anew from the exact surfaces, by chord tolerance or by triangle count.
 
-A level needs one number, the tolerance; how many triangles it will cost is known from the plan (lib.nurbs.lines)
-without cutting anything, so a count is met by bisection over the tolerance of all surfaces together: triangles go
-where the largest distances are.
+A level needs one number, the tolerance; how many triangles it will cost is known (of trimmed surfaces about) from the
+plan (lib.nurbs.lines) and the border points without cutting anything, so a count is met by bisection over the tolerance
+of all surfaces together: triangles go where the largest distances are.
 
 Thinning a finer mesh by quadrics instead (fast_simplification, positions only: it gives up the parameters, seams and
 borders) was measured on the teapot, a sphere and a head: at 30 % to 1 % of the triangles its largest distance is 1.5 to
@@ -13,13 +13,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lib.nurbs import borders as find_borders
-from lib.nurbs import evaluate, facets, tessellate
-from lib.nurbs import lines as find_lines
+from lib.nurbs import facets
+from lib.surfaces import tessellate
+from lib.surfaces.gaps import gap
 
 DEVIATION = 1e-4  # of the frame: the finest level, where none is named
 SLIDE = 8  # a texture may slide as many tolerances, or tessellate.SLIDE of the surface's size if that is more
 COARSEST, FINEST = 10.0, 1e-9  # tolerances searched, in frames
+ATTEMPTS = 8  # of asking for fewer triangles where more came out than were predicted
 LESSONS = 1  # times a level by count is cut again after measuring finer what came out far off
 MOST = 4_000_000  # triangles of one level
 
@@ -32,7 +33,7 @@ class TooFine(ValueError):
 class Level:
     """One level in the frame of its surfaces.
 
-    mesh : lib.nurbs.tessellate.Mesh
+    mesh : lib.surfaces.tessellate.SceneMesh
     N : (n_v, 3) float64 unit normals of the exact surfaces, along S_u x S_v
     tolerance : float    chord tolerance it was cut for
     gap : float          largest distance between two surfaces along a border they share
@@ -40,7 +41,7 @@ class Level:
     is_smallest : bool   the asked count was below what these surfaces need
     """
 
-    mesh: tessellate.Mesh
+    mesh: tessellate.SceneMesh
     N: np.ndarray
     tolerance: float
     gap: float
@@ -56,48 +57,57 @@ class Scene:
 
     def __init__(self, surfaces, known, lattice=None):
         self.surfaces, self.known = surfaces, known
-        self.plan = tessellate.plan(surfaces, known, lattice)
+        self.pieces = tessellate.Pieces(surfaces, known, lattice)
         self.size = known.extent.max(axis=1)
 
-    def slide(self, tolerance):
-        """Allowed slide (n,) at a chord tolerance."""
-        return np.maximum(SLIDE * tolerance, tessellate.SLIDE * self.size)
+    def asked_of(self, tolerance):
+        """(tolerance (n,), allowed slide (n,)) of the surfaces at a chord tolerance."""
+        whole = np.full(len(self.surfaces), float(tolerance))
+        return whole, np.maximum(SLIDE * tolerance, tessellate.SLIDE * self.size)
 
-    def predicted(self, tolerance, plan=None):
+    def predicted(self, tolerance, pieces=None):
         """Triangles a chord tolerance will cost, before measuring."""
-        plan = plan or self.plan
-        both = np.stack([np.full(len(self.surfaces), tolerance), self.slide(tolerance)], axis=1)
-        return int(tessellate.n_triangles(plan, self.known, find_lines.steps(plan, both)).sum())
+        return int((pieces or self.pieces).n_triangles(*self.asked_of(tolerance)).sum())
 
     def by_deviation(self, tolerance):
         """The Level whose measured distance is at most `tolerance` (> 0)."""
         self._affordable(self.predicted(tolerance))
-        whole = np.full(len(self.surfaces), float(tolerance))
-        patches = tessellate.cut_within(self.surfaces, self.known, self.plan, whole, self.slide(tolerance))
-        return self._level(patches, tolerance, None, False)
+        return self._level(self.pieces.cut_within(*self.asked_of(tolerance)), tolerance, None, False)
 
     def by_count(self, asked):
         """The Level of at most `asked` triangles, or the smallest there is."""
         self._affordable(asked)
-        plan = self.plan
+        pieces = self.pieces
         for _ in range(1 + LESSONS):
-            tolerance = self.tolerance_for(asked, plan)
-            whole = np.full(len(self.surfaces), tolerance)
-            patches, placed = tessellate.cut(self.surfaces, self.known, plan, whole, self.slide(tolerance))
-            better = tessellate.learned(self.surfaces, self.known, plan, patches, placed, whole)
+            tolerance, patches = self._cut(asked, pieces)
+            better = pieces.learned(patches, *self.asked_of(tolerance))
             if better is None:
                 break
-            plan = better
-        return self._level(patches, tolerance, asked, sum(len(p.F) for p in patches) > asked)
+            pieces = better
+        return self._level(patches, tolerance, asked, _count(patches) > asked)
 
-    def tolerance_for(self, asked, plan=None):
+    def _cut(self, asked, pieces):
+        """(tolerance, patches) of at most `asked` triangles where that can be: what was cut may differ from what was
+        predicted, then less is asked for.
+        """
+        ask = asked
+        for _ in range(ATTEMPTS):
+            tolerance = self.tolerance_for(ask, pieces)
+            patches = pieces.cut(*self.asked_of(tolerance))
+            count = _count(patches)
+            if count <= asked or tolerance == COARSEST:
+                break
+            ask = min(int(ask * asked / count), ask - 1)
+        return tolerance, patches
+
+    def tolerance_for(self, asked, pieces=None):
         """The smallest tolerance found by bisection whose count is at most `asked`; the coarsest if none is."""
         low, high = np.log(FINEST), np.log(COARSEST)
-        if self.predicted(COARSEST, plan) > asked:
+        if self.predicted(COARSEST, pieces) > asked:
             return COARSEST
         for _ in range(40):
             middle = (low + high) / 2
-            if self.predicted(np.exp(middle), plan) <= asked:
+            if self.predicted(np.exp(middle), pieces) <= asked:
                 high = middle
             else:
                 low = middle
@@ -108,40 +118,23 @@ class Scene:
             raise TooFine(f"needs {count} triangles, at most {MOST} are allowed")
 
     def _level(self, patches, tolerance, asked, is_smallest):
-        mesh = tessellate.assemble(patches, self.known)
-        N = np.concatenate([_normals(*each) for each in zip(self.surfaces, patches, strict=True)])
-        return Level(mesh, N, float(tolerance), gap(mesh, self.surfaces, self.known), asked, is_smallest)
+        mesh = tessellate.assemble(patches, self.surfaces, self.known)
+        N = np.concatenate([self._normals(s, patch) for s, patch in enumerate(patches)])
+        between = gap(mesh, self.surfaces, self.known)
+        return Level(mesh, N, float(tolerance), between, asked, is_smallest)
+
+    def _normals(self, s, patch):
+        """Unit normals (k, 3) of the exact surface at a patch's vertices; of its triangles where it has none."""
+        try:
+            return self.pieces.normals(s, patch)
+        except ValueError:
+            N, area = facets.normals(*(patch.S[patch.F[:, k]] for k in range(3)))
+            total = np.zeros_like(patch.S)
+            for k in range(3):
+                np.add.at(total, patch.F[:, k], N * area[:, None])
+            length = np.linalg.norm(total, axis=1, keepdims=True)
+            return np.where(length > 0, total / np.maximum(length, 1e-300), [0.0, 0.0, 1.0])
 
 
-def _normals(surface, patch):
-    """Unit normals (k, 3) of the exact surface at a patch's vertices; of its triangles where the surface has none."""
-    try:
-        return evaluate.normal(surface, patch.UV[:, 0], patch.UV[:, 1])
-    except ValueError:
-        N, area = facets.normals(*(patch.S[patch.F[:, k]] for k in range(3)))
-        total = np.zeros_like(patch.S)
-        for k in range(3):
-            np.add.at(total, patch.F[:, k], N * area[:, None])
-        length = np.linalg.norm(total, axis=1, keepdims=True)
-        return np.where(length > 0, total / np.maximum(length, 1e-300), [0.0, 0.0, 1.0])
-
-
-def gap(mesh, surfaces, known):
-    """Largest distance between neighbours along borders: those of equal speed are welded, the others are measured."""
-    largest = 0.0
-    for a, side_a, b, side_b, is_reversed in known.borders.tolist():
-        first, second = mesh.V[mesh.side[a][side_a]], mesh.V[mesh.side[b][side_b]]
-        if len(first) == len(second):
-            largest = max(largest, float(np.abs(first - (second[::-1] if is_reversed else second)).max()))
-        else:
-            largest = max(largest, _between(first, second))
-    usable = ~known.is_collapsed.ravel()
-    data = find_borders.sides(surfaces)
-    for i, j in find_borders.same_curve(data, usable, find_borders.rows_of(known.borders)):
-        if not (i // 4 == j // 4 and known.is_closed[i // 4, i % 4 // 2]):
-            largest = max(largest, _between(*(mesh.V[mesh.side[k // 4][k % 4]] for k in (i, j))))
-    return largest
-
-
-def _between(a, b):
-    return max(find_borders.to_polyline(a, b), find_borders.to_polyline(b, a))
+def _count(patches):
+    return sum(len(p.F) for p in patches)

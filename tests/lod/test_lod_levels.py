@@ -4,9 +4,11 @@ import numpy as np
 import pytest
 
 from lib.lod.coverage import screen_coverage
-from lib.lod.levels import MOST, Scene, TooFine, gap
-from lib.nurbs import evaluate, tessellate
+from lib.lod.levels import MOST, Scene, TooFine
+from lib.nurbs import evaluate
 from lib.nurbs.surface import from_points
+from lib.surfaces import tessellate
+from lib.surfaces.gaps import gap
 from lib.visibility import closest
 from tests import shapes
 from tests.shapes import box, rectangle, sphere, triangle

@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from lib.nurbs import borders, lines, tessellate
+from lib.nurbs import borders, lines
 from lib.nurbs.shape import transformed
 from lib.nurbs.surface import from_points
+from lib.surfaces import tessellate
 from tests.shapes import box, cylinder, disc, rectangle, sphere, teapot
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from lib.elements.grids import ElementGrids
-from lib.nurbs import tessellate
+from lib.surfaces import tessellate
 from lib.visibility.mesh_lookup import MeshLookup
 from lib.visibility.tracer import MISSED, Tracer
 from tests.shapes import box, sphere
@@ -22,10 +22,8 @@ def rays(*of):
 def mesh_of(surfaces, tolerance=0.01):
     known = tessellate.shapes(surfaces, np.ones(len(surfaces), bool))
     n = len(surfaces)
-    patches = tessellate.cut_within(
-        surfaces, known, tessellate.plan(surfaces, known), np.full(n, tolerance), np.ones(n)
-    )
-    mesh = tessellate.assemble(patches, known)
+    patches = tessellate.Pieces(surfaces, known).cut_within(np.full(n, tolerance), np.ones(n))
+    mesh = tessellate.assemble(patches, surfaces, known)
     return mesh.V, mesh.F
 
 

@@ -3,17 +3,18 @@
 import numpy as np
 import pytest
 
-from lib.nurbs import evaluate, facets, lines, tessellate
+from lib.nurbs import evaluate, facets, lines
 from lib.nurbs.surface import NurbsSurface, bezier, from_points
+from lib.surfaces import tessellate
 from tests.shapes import box, cylinder, disc, extruded, rectangle, revolved, sphere, triangle
 
 
 def mesh_of(surfaces, tolerance, slide=1.0):
     known = tessellate.shapes(surfaces, np.ones(len(surfaces), bool))
-    plan = tessellate.plan(surfaces, known)
+    pieces = tessellate.Pieces(surfaces, known)
     n = len(surfaces)
-    patches = tessellate.cut_within(surfaces, known, plan, np.full(n, tolerance), np.full(n, slide))
-    return tessellate.assemble(patches, known), known
+    patches = pieces.cut_within(np.full(n, tolerance), np.full(n, slide))
+    return tessellate.assemble(patches, surfaces, known), known
 
 
 def edge_uses(mesh):
