@@ -13,15 +13,15 @@ ROUGH_ROUNDS, FAR_OFF = 1, 1.3  # of putting points inside, where a count is ask
 
 
 class TrimmedPieces:
-    """n TrimmedSurfaces and what of them does not depend on a tolerance.
+    """n TrimmedSurfaces, with what lib.surfaces.tessellate.Shapes knows of them.
 
-    extent (n, 2), is_closed (n, 2), is_collapsed (n, 4) as lib.surfaces.measure says; lattice : {surface: (u, v)}
-    interior parameters that must have a line
+    lattice : {surface: (u, v)} interior parameters that must have a line whatever the shape
     """
 
-    def __init__(self, surfaces, extent, is_closed, is_collapsed, lattice=None):
-        self.surfaces, self.extent = surfaces, extent
-        demands = [find_lines.demand(s.base, c, p) for s, c, p in zip(surfaces, is_closed, is_collapsed, strict=True)]
+    def __init__(self, surfaces, known, lattice=None):
+        self.surfaces, self.extent = surfaces, known.extent
+        each = zip(surfaces, known.is_closed, known.is_collapsed, strict=True)
+        demands = [find_lines.demand(s.base, c, p) for s, c, p in each]
         for s, along in (lattice or {}).items():
             for d in (0, 1):
                 demands[s] = find_lines.with_lines(demands[s], d, along[d])
