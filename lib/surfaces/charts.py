@@ -1,0 +1,275 @@
+"""Charts of a mesh: its triangles laid out flat in a square map, without overlap.  The one importer of xatlas.
+
+xatlas cuts the mesh into pieces and flattens those that are not plane; plane ones are laid out here, without
+distortion.  It then packs them, each stretched up to whole cells (so none is narrower than a cell, and sides of
+rectangles lie on crossings of the map's lattice).  Measured with xatlas 0.0.11: `padding` p keeps charts 2 p + 0.75
+cells apart, none at the border; the same input gives the same bytes, on any number of threads.
+
+Lengths are scaled so that the mesh's area is AREA before xatlas sees them: it works in float32 and ignores triangles
+below 1e-7, whatever their unit.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import xatlas
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from lib.surfaces.mesh import Mesh
+from lib.surfaces.mesh_build import normals_areas
+
+PADDING = 4  # cells of the finest level between charts, and from the border: one cell two levels coarser
+LEAST_LEVEL, MOST_LEVEL = 3, 11
+AREA = 1e6
+TRIALS = 6  # packings until the map is as full as can be
+MOST_STRETCH = 3.0  # of the mesh's own texture coordinates, between any two directions or places of a chart
+SLIVER = 0.05, 0.1  # length, in units, and height over it, at least: given to triangles that xatlas ignores
+SMALL = 1e-5  # area the largest triangle of a chart is given at least; xatlas ignores what is below 1e-7
+
+
+def charted(mesh, texel):
+    """The mesh with charts.
+
+    mesh : Mesh;  texel : wanted edge of a cell of the map's finest level, in the mesh's unit
+    Returns Mesh with uv, chart and level.  Cells come out within a factor sqrt(2) of `texel`; larger where the map
+    would need more than 2^MOST_LEVEL cells a side, smaller where it fits in 2^LEAST_LEVEL.
+
+    Raises ValueError `charts: ...` where the charts do not fit, however small.
+    """
+    unit = _unit(mesh)
+    flat, chart = _cut(mesh, unit)
+    index = np.unique(chart[:, None] * len(mesh.V) + mesh.F, return_inverse=True)[1].reshape(-1, 3)
+    return _packed(mesh, flat, index, chart, texel / unit)
+
+
+def own_charts(mesh, texel):
+    """As charted, with pieces and shapes of the mesh's own texture coordinates; None where those do not serve.
+
+    They serve if no piece is folded over, overlaps itself or is stretched by more than MOST_STRETCH.  Where the pieces
+    lie does not matter: they are packed anew.
+    """
+    if mesh.T is None:
+        return None
+    unit = _unit(mesh)
+    index, chart = _pieces(mesh)
+    flat = mesh.T.astype(np.float64)
+    flat = flat - flat.reshape(-1, 2).min(axis=0)
+    signed = _signed_areas(flat)
+    sign = np.sign(np.bincount(chart, signed))
+    if (signed * sign[chart] <= 0).any():
+        return None
+    flat = flat * np.stack([sign, np.ones_like(sign)], axis=1)[chart][:, None]
+    area = normals_areas(mesh.V, mesh.F)[1] / unit**2
+    flat = flat * np.sqrt(np.bincount(chart, area) / np.bincount(chart, np.abs(signed)))[chart][:, None, None]
+    low, high = stretch(mesh.V / unit, mesh.F, flat)
+    if low.min() < 1 / MOST_STRETCH or high.max() > MOST_STRETCH or (high > MOST_STRETCH * low).any():
+        return None
+    made = _packed(mesh, flat, index, chart, texel / unit)
+    return None if overlap(made) > 0 else made
+
+
+def stretch(V, F, flat):
+    """Least and largest scale (m,), (m,) of the maps from triangles in space to flat (m, 3, 2)."""
+    a, b = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
+    length = np.linalg.norm(a, axis=1)
+    along = np.einsum("ij,ij->i", a, b) / length
+    height = np.linalg.norm(np.cross(a, b), axis=1) / length
+    J = np.empty((len(F), 2, 2))
+    J[:, :, 0] = (flat[:, 1] - flat[:, 0]) / length[:, None]
+    J[:, :, 1] = (flat[:, 2] - flat[:, 0] - J[:, :, 0] * along[:, None]) / height[:, None]
+    values = np.linalg.svd(J, compute_uv=False)
+    return values[:, 1], values[:, 0]
+
+
+def overlap(mesh, side=1024):
+    """Share of a charted map's points, side x side, that lie inside of two triangles."""
+    hits = np.zeros(side * side, dtype=np.uint8)
+    corners = mesh.uv * side
+    low = np.ceil(corners.min(axis=1) - 0.5).astype(np.int64)
+    high = np.floor(corners.max(axis=1) - 0.5).astype(np.int64)
+    width, height = (np.maximum(high - low + 1, 0)).T
+    # Test the points in the boxes of some triangles at once.
+    for part in np.array_split(np.arange(len(corners)), 1 + int((width * height).sum() // 4_000_000)):
+        count = width[part] * height[part]
+        which = np.repeat(part, count)
+        k = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+        x, y = low[which, 0] + k % width[which], low[which, 1] + k // width[which]
+        inside = np.ones(len(which), dtype=bool)
+        c = corners[which]
+        for j in range(3):
+            p, q = c[:, j], c[:, (j + 1) % 3]
+            turn = (q[:, 0] - p[:, 0]) * (y + 0.5 - p[:, 1]) - (q[:, 1] - p[:, 1]) * (x + 0.5 - p[:, 0])
+            inside &= turn > 1e-6 * side  # a little inside: neighbours share edges
+        np.add.at(hits, (y * side + x)[inside], 1)
+    return np.count_nonzero(hits > 1) / max(np.count_nonzero(hits), 1)
+
+
+def _unit(mesh):
+    """Length to divide by for a total area of AREA."""
+    area = float(normals_areas(mesh.V, mesh.F)[1].sum())
+    if not area > 0:
+        raise ValueError("charts: the mesh has no area")
+    return float(np.sqrt(area / AREA))
+
+
+def _pieces(mesh):
+    """Corners as numbers (m, 3), equal where position and texture coordinates are, and the piece (m,) of triangles
+    that hang together by them.
+    """
+    rows = np.concatenate([mesh.F.reshape(-1, 1).astype(np.float64), mesh.T.reshape(-1, 2)], axis=1)
+    index = np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1, 3)
+    n, m = int(index.max()) + 1, len(index)
+    ends = (np.repeat(np.arange(m), 3), m + index.ravel())
+    graph = coo_array((np.ones(3 * m, dtype=np.int8), ends), shape=(m + n, m + n))
+    _, piece = connected_components(graph, directed=False)
+    return index, np.unique(piece[:m], return_inverse=True)[1]
+
+
+def _cut(mesh, unit):
+    """Flattened corners (m, 3, 2) in units of `unit`, chart by chart, and the chart (m,) of each triangle."""
+    V = (mesh.V - (mesh.V.min(axis=0) + mesh.V.max(axis=0)) / 2) / unit
+    atlas = xatlas.Atlas()
+    atlas.add_mesh(V.astype(np.float32), mesh.F.astype(np.uint32))
+    cutting, packing = xatlas.ChartOptions(), xatlas.PackOptions()
+    cutting.max_iterations = 1
+    packing.texels_per_unit, packing.padding = 1.0, 0
+    atlas.generate(cutting, packing)
+    _, index, uv = atlas.get_mesh(0)
+    flat = (uv.astype(np.float64) * (atlas.width, atlas.height))[index]
+    chart, plane = np.full(len(mesh.F), -1, dtype=np.int64), np.zeros(atlas.get_mesh_chart_count(0), dtype=bool)
+    for k in range(len(plane)):
+        piece = atlas.get_mesh_chart(0, k)
+        chart[np.asarray(piece.faces)] = k
+        plane[k] = piece.type == xatlas.ChartType.Planar
+    # Triangles that xatlas ignores, too small for float32, are charts of their own.
+    lost = np.flatnonzero(chart < 0)
+    chart[lost] = len(plane) + np.arange(len(lost))
+    n = len(plane) + len(lost)
+    plane = np.concatenate([plane, np.zeros(len(lost), dtype=bool)])
+    length = np.maximum(np.linalg.norm(V[mesh.F[lost, 1]] - V[mesh.F[lost, 0]], axis=1), SLIVER[0])
+    flat[lost] = length[:, None, None] * np.array([[0.0, 0.0], [1.0, 0.0], [0.5, SLIVER[1]]])
+    area = np.abs(_signed_areas(flat))
+    true = normals_areas(V, mesh.F)[1]
+    scale = np.sqrt(np.bincount(chart, true, n) / np.bincount(chart, area, n))
+    scale[len(plane) - len(lost) :] = 1.0
+    flat *= scale[chart][:, None, None]
+    return np.where(plane[chart][:, None, None], _projected(V, mesh.F, chart, n), flat), chart
+
+
+def _projected(V, F, chart, n):
+    """Corners (m, 3, 2) of triangles seen along the mean normal of their chart."""
+    normal, area = normals_areas(V, F)
+    N = np.stack([np.bincount(chart, area * normal[:, k], n) for k in range(3)], axis=1)
+    N /= np.maximum(np.linalg.norm(N, axis=1), 1e-300)[:, None]
+    # x: the longest edge of each chart.
+    edges = np.stack([V[F[:, (k + 1) % 3]] - V[F[:, k]] for k in range(3)], axis=1)
+    length = np.linalg.norm(edges, axis=2)
+    order = np.lexsort((-length.max(axis=1), chart))
+    first = order[np.searchsorted(chart[order], np.arange(n))]
+    x = edges[first, length[first].argmax(axis=1)]
+    x = x - np.einsum("ij,ij->i", x, N)[:, None] * N
+    x /= np.maximum(np.linalg.norm(x, axis=1), 1e-300)[:, None]
+    y = np.cross(N, x)
+    at = V[F] - V[F[first, 0]][chart][:, None]
+    return np.stack([np.einsum("ijk,ik->ij", at, axis[chart]) for axis in (x, y)], axis=2)
+
+
+def _packed(mesh, flat, index, chart, texel):
+    """Mesh with its charts in the smallest map near the wanted size of cells.
+
+    flat : (m, 3, 2) corners;  index : (m, 3) numbers of the corners, equal where the points are;  texel : in its unit
+    """
+    if not (np.isfinite(texel) and texel > 0):
+        raise ValueError(f"charts: a cell of {texel}")
+    n = int(chart.max()) + 1
+    largest = np.zeros(n)
+    np.maximum.at(largest, chart, np.abs(_signed_areas(flat)))
+    flat = flat * np.sqrt(np.maximum(SMALL / largest, 1.0))[chart][:, None, None]
+    points = np.empty((int(index.max()) + 1, 2))
+    points[index.ravel()[::-1]] = flat.reshape(-1, 2)[::-1]  # the first of each counts
+    density = min(1 / texel, 2 * 2**MOST_LEVEL / np.sqrt(AREA))
+    tried, level = [], None
+    for _ in range(TRIALS):
+        corners = _pack(points, index, chart, n, density)
+        tried.append((density, float(corners.max()) + 2 * PADDING, corners))
+        if level is None:
+            level = int(np.clip(np.round(np.log2(tried[0][1])), LEAST_LEVEL, MOST_LEVEL))
+        density = _next_density(tried, 2**level)
+        if density is None:
+            break
+    if min(need for _, need, _ in tried) > 2**level:  # the space between charts alone is wider than that
+        level += 1
+    fitting = [trial for trial in tried if trial[1] <= 2**level]
+    if level > MOST_LEVEL or not fitting:
+        raise ValueError(f"charts: {n} charts do not fit in a map of {2**MOST_LEVEL} x {2**MOST_LEVEL} cells")
+    corners = max(fitting, key=lambda trial: trial[0])[2]
+    uv = (corners + PADDING) / 2**level
+    return replace(mesh, uv=uv, chart=chart.astype(np.int32), level=level)
+
+
+def _next_density(tried, room):
+    """Cells per unit to try next, for a map of `room`, from those tried with what they needed; None if that is full."""
+    fits = max((trial[:2] for trial in tried if trial[1] <= room), default=(0.0, 0.0))
+    over = min((trial[:2] for trial in tried if trial[1] > room), default=(np.inf, np.inf))
+    if fits[1] > 0.96 * room or over[0] < 1.01 * fits[0]:
+        return None
+    if not fits[0]:
+        low = 2 * PADDING
+        return over[0] * max(0.97 * (room - low) / (over[1] - low), 0.25)
+    if over[0] == np.inf:
+        return fits[0] * min(0.98 * room / fits[1], 8.0)
+    return fits[0] + (over[0] - fits[0]) * (0.97 * room - fits[1]) / (over[1] - fits[1])
+
+
+def _pack(points, index, chart, n, density):
+    """Corners (m, 3, 2) in cells of the packed charts; the least is 0."""
+    atlas = xatlas.Atlas()
+    atlas.add_uv_mesh(points.astype(np.float32), index.astype(np.uint32), chart.astype(np.uint32)[:, None])
+    packing = xatlas.PackOptions()
+    packing.texels_per_unit, packing.padding = float(density), PADDING // 2
+    atlas.generate(xatlas.ChartOptions(), packing)
+    _, placed, uv = atlas.get_mesh(0)
+    corners = (uv.astype(np.float64) * (atlas.width, atlas.height))[placed]
+    is_placed = np.zeros(len(index), dtype=bool)
+    for k in range(atlas.get_mesh_chart_count(0)):
+        is_placed[np.asarray(atlas.get_mesh_chart(0, k).faces)] = True
+    corners = _moved(points[index], corners, np.where(is_placed, chart, n), chart, n)
+    # Charts are stretched to whole cells; the box of each comes out within float32 of them.
+    low, high = np.full((n, 2), np.inf), np.full((n, 2), -np.inf)
+    np.minimum.at(low, chart, corners.min(axis=1))
+    np.maximum.at(high, chart, corners.max(axis=1))
+    low_whole = np.round(low - 0.5)
+    size_whole = np.maximum(np.round(high - 0.5) - low_whole, 1.0)
+    size = np.where(high > low, high - low, 1.0)
+    corners = (corners - low[chart][:, None]) / size[chart][:, None] * size_whole[chart][:, None]
+    corners += low_whole[chart][:, None]
+    return corners - corners.min(axis=(0, 1))
+
+
+def _moved(flat, corners, placed, chart, n):
+    """The corners `flat` moved by the affine map of each chart that fits best where xatlas has put it: in float64, and
+    for the triangles that it ignores too.
+
+    placed : chart of a triangle, or n of one that was ignored
+    """
+    who = np.repeat(placed, 3)
+    a, b = flat.reshape(-1, 2), corners.reshape(-1, 2)
+    count = np.maximum(np.bincount(who, minlength=n + 1)[:n], 1)
+
+    def mean(x):
+        return np.bincount(who, x, n + 1)[:n] / count
+
+    mean_a, mean_b = (np.stack([mean(p[:, 0]), mean(p[:, 1])], axis=1) for p in (a, b))
+    known = who < n
+    da, db = np.zeros_like(a), np.zeros_like(b)
+    da[known], db[known] = a[known] - mean_a[who[known]], b[known] - mean_b[who[known]]
+    A = np.stack([mean(da[:, i] * da[:, j]) for i in (0, 1) for j in (0, 1)], axis=1).reshape(n, 2, 2)
+    B = np.stack([mean(da[:, i] * db[:, j]) for i in (0, 1) for j in (0, 1)], axis=1).reshape(n, 2, 2)
+    M = np.linalg.solve(A, B)
+    return np.einsum("ijk,ikl->ijl", flat - mean_a[chart][:, None], M[chart]) + mean_b[chart][:, None]
+
+
+def _signed_areas(flat):
+    a, b = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    return (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
