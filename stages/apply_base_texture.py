@@ -20,8 +20,8 @@ from lib.formats.artefact import read_json
 from lib.maps import base_texture
 from lib.maps.fill import one_deep
 from lib.maps.mapset import pack, side_lengths
-from lib.nurbs.shape import collapsed_sides, is_closed
 from lib.refusal import Refusal
+from lib.surfaces.measure import collapsed_sides, is_closed
 
 
 def arguments(parser):
@@ -135,14 +135,14 @@ def load_picture(texture, name, loaded, used):
 
 
 def textured(B, hidden, roots, level, surface, picture, repeat, rho_avg, texture_level):
-    """Return (level, B_final, hidden) on the grid that holds both the light and the picture."""
-    common = base_texture.common_level(roots, level, picture.shape[1::-1], repeat, texture_level)
+    """Return (level, B_final, hidden) on the grid that holds both the light and the picture.
+
+    The light of a finer crossing is what the light map shows there, so it mixes charts of a mesh no more than that.
+    """
+    common = base_texture.level_on_map(surface, roots, level, picture.shape[1::-1], repeat, texture_level)
     B, hidden = base_texture.upsample(B, hidden, common - level)
-    w, h = side_lengths(roots, common)
-    rho = base_texture.evaluate_picture(
-        picture, repeat, w, h, base_texture.wraps(surface, repeat), collapsed_sides(surface)
-    )
-    return common, base_texture.apply(B, rho, rho_avg), hidden
+    rho, outside = base_texture.on_map(surface, picture, repeat, *side_lengths(roots, common))
+    return common, base_texture.apply(B, rho, rho_avg), hidden | outside
 
 
 def sweep(folder, stems):

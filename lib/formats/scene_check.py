@@ -11,6 +11,7 @@ from lib.maps.budget import gpu_bytes, smallest_total
 from lib.nurbs.tessellate import frame
 from lib.refusal import Refusal
 from lib.surfaces.measure import extent
+from lib.surfaces.mesh import Mesh
 
 DIGITS = 4  # of an average reflectance: a repainted texture whose average moves less re-bakes nothing
 AUTO = "auto"  # the reconstruction of surfaces that ask for none
@@ -138,8 +139,12 @@ def _reflectances(source, wanted, made, pictures_folder, warnings):
         if key not in opened:
             opened[key] = _picture(source, name, material["texture"], row, mistakes, warnings)
         if opened[key] is not None:
+            surface = made.surfaces[index]
+            if isinstance(surface, Mesh) and surface.T is None:
+                mistakes.add("the mesh has no texture coordinates", source.file, name, "texture")
+                continue
             textures[name] = row
-            rho = rho_average(made.surfaces[index], opened[key], tuple(row["repeat"]))
+            rho = rho_average(surface, opened[key], tuple(row["repeat"]))
             rho_avg[name] = [min(round(float(x), DIGITS), 1.0) for x in rho]
     mistakes.stop()
     _warn_bright(made, rho_avg, warnings)

@@ -9,27 +9,42 @@ never resized into the other: the picture is *evaluated* at crossings by a box o
 whichever is wider.  A box of one pixel over constant squares is bilinear interpolation of the pixel centres.  Past
 the border of the domain the picture goes round where it is tiled or the surface is closed; elsewhere the box is cut
 off there, which repeats the border pixel and keeps the mean.
+
+The picture of a trimmed surface lies over the whole surface it is cut from; its box says which part of [0, 1]^2 its
+own map shows.  Meshes have texture coordinates (lib.maps.mesh_texture).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from lib.maps import mesh_texture
+from lib.maps.pixels import bilinear, box_means, lerp
 from lib.nurbs.evaluate import evaluate_grid
 from lib.nurbs.shape import is_closed
+from lib.surfaces.frames import domain_of, whole
+from lib.surfaces.loops import following
+from lib.surfaces.measure import collapsed_sides
+from lib.surfaces.mesh import Mesh
+from lib.surfaces.trimmed import TrimmedSurface
 
 CELLS = 128  # quadrature cells a direction; sphere: area element to 5e-5, and errors common to all cells cancel
-MAX_TAPS = 16  # pixels under one box up to which adding them up is quicker than running sums
+PARTS, LEAST_SHARE = 4, 1 / 64  # of a cell along a trim, each way, and of its area where none of them is inside
+WHOLE = (0.0, 1.0, 0.0, 1.0)  # the box of a surface that is not cut
+FULL_TURN = 1e-9  # a box this near to the length 1 has it
 
 
 def rho_average(surface, picture, repeat=(1, 1)):
     """Return the mean reflectance (3,) float64 of a textured surface, weighted by area: the rho its bake uses.
 
-    surface : NurbsSurface;  picture : (H, W, 3) linear RGB in [0, 1];  repeat : tiles (n, m) > 0.
+    surface : NurbsSurface, TrimmedSurface or Mesh with T;  picture : (H, W, 3) linear RGB in [0, 1];  repeat : tiles
+    (n, m) > 0.
 
     Exact for constant pictures on any surface and for any picture where |S_u x S_v| is constant; else midpoint rule
-    on at least CELLS^2 cells that never straddle a knot.
+    on at least CELLS^2 cells that never straddle a knot, those on the border of a trimmed surface by their share.
     """
+    if isinstance(surface, Mesh):
+        return mesh_texture.rho_average(surface, picture, repeat)
     low = picture.min(axis=(0, 1)).astype(np.float64)  # taken off first: a constant keeps its value to the last bit
     contrast, weight = rho_cells(surface, picture - low, repeat)
     return low + np.einsum("ji,jic->c", weight, contrast) / weight.sum()
@@ -39,27 +54,51 @@ def rho_cells(surface, picture, repeat=(1, 1)):
     """Return the cells rho_average is taken on: rho (k, l, 3) float64 and area (k, l) of each, row 0 at v = 0."""
     picture = _bottom_up(picture)
     H, W, _ = picture.shape
-    edges_u = _cell_edges(surface.knots_u, repeat[0] * W)
-    edges_v = _cell_edges(surface.knots_v, repeat[1] * H)
+    base, (part_u, part_v) = whole(surface), _parts(_box_of(surface))
+    edges_u = _cell_edges(base.knots_u, repeat[0] * W, *part_u)
+    edges_v = _cell_edges(base.knots_v, repeat[1] * H, *part_v)
     u, v = (edges_u[1:] + edges_u[:-1]) / 2, (edges_v[1:] + edges_v[:-1]) / 2
-    _, S_u, S_v = evaluate_grid(surface, u, v)
+    _, S_u, S_v = evaluate_grid(base, u, v)
     weight = np.linalg.norm(np.cross(S_u, S_v), axis=2) * np.diff(edges_u) * np.diff(edges_v)[:, None]
     wrap_u, wrap_v = wraps(surface, repeat)
-    rho = _cell_values(picture, edges_v, repeat[1], wrap_v, axis=0)
-    return _cell_values(rho, edges_u, repeat[0], wrap_u, axis=1), weight
+    rho = _cell_values(picture, edges_v, repeat[1], wrap_v, part_v, axis=0)
+    rho = _cell_values(rho, edges_u, repeat[0], wrap_u, part_u, axis=1)
+    if isinstance(surface, TrimmedSurface):
+
+        def values(u, v):
+            x, y = ((start + t * length) for t, (start, length) in ((u, part_u), (v, part_v)))
+            return bilinear(picture, x * W * repeat[0], y * H * repeat[1], (wrap_u, wrap_v))
+
+        _trim(surface, edges_u, edges_v, rho, weight, values)
+    return rho, weight
 
 
 def wraps(surface, repeat):
     """Return (bool, bool): the picture goes round at the border of u, of v."""
-    closed = is_closed(surface)
-    return repeat[0] > 1 or closed[0], repeat[1] > 1 or closed[1]
+    closed, (_, u1, _, v1) = is_closed(whole(surface)), _box_of(surface)
+    return bool(repeat[0] > 1 or closed[0] or u1 > 1), bool(repeat[1] > 1 or closed[1] or v1 > 1)
 
 
-def _cell_edges(knots, n_pixels):
-    """Return cell edges in [0, 1]: at every knot, at every pixel centre while these are few, at most 1/CELLS apart."""
+def _box_of(surface):
+    return surface.box if isinstance(surface, TrimmedSurface) else WHOLE
+
+
+def _parts(box):
+    """(start, length) along u and along v of a box u0, u1, v0, v1."""
+    for start, end in (box[:2], box[2:]):
+        length = float(end) - float(start)
+        yield float(start), 1.0 if abs(length - 1) <= FULL_TURN else length
+
+
+def _cell_edges(knots, n_pixels, start, length):
+    """Return cell edges in [0, 1]: at every knot, at every pixel centre while these are few, at most 1/CELLS apart.
+
+    n_pixels : over the whole surface, of which [0, 1] shows [start, start + length]
+    """
     lines = [np.array([0.0, 1.0]), knots[(knots > 0) & (knots < 1)]]
-    if n_pixels <= 2 * CELLS:
-        lines.append((np.arange(int(np.ceil(n_pixels))) + 0.5) / n_pixels)
+    if n_pixels * length <= 2 * CELLS:
+        centres = np.arange(int(np.floor(start * n_pixels)), int(np.ceil((start + length) * n_pixels))) + 0.5
+        lines.append((centres / n_pixels - start) / length)
     lines = np.unique(np.concatenate(lines))
     lines = lines[(lines >= 0) & (lines <= 1)]
     parts = np.maximum(np.ceil(np.diff(lines) * CELLS - 1e-9), 1).astype(int)
@@ -67,28 +106,82 @@ def _cell_edges(knots, n_pixels):
     return np.concatenate([*inner, [1.0]])
 
 
-def _cell_values(array, edges, repeat, wrap, axis):
+def _cell_values(array, edges, repeat, wrap, part, axis):
     """Return the mean over each cell: its integral where pixels are many, else the middle of a linear piece."""
-    n = array.shape[axis] * repeat
-    if n > 2 * CELLS:
-        return _box(array, edges[:-1] * n, edges[1:] * n, axis)
-    return _lerp(array, (edges[1:] + edges[:-1]) / 2 * n, wrap, axis)
+    (start, length), n = part, array.shape[axis] * repeat
+    if n * length > 2 * CELLS:
+        return box_means(array, (start + edges[:-1] * length) * n, (start + edges[1:] * length) * n, axis)
+    return lerp(array, (start + (edges[1:] + edges[:-1]) / 2 * length) * n, wrap, axis)
 
 
-def evaluate_picture(picture, repeat, w, h, wrap=(False, False), collapsed=(False,) * 4):
+def _trim(surface, edges_u, edges_v, rho, weight, values):
+    """Multiply the weights (k, l) of cells by their share inside the loops of a trimmed surface, in place; on its
+    border take rho (k, l, 3) from the part inside, by values(u, v) of single places."""
+    domain = domain_of(surface, (CELLS, CELLS))
+    if domain is None:
+        return
+    u, v = np.meshgrid((edges_u[1:] + edges_u[:-1]) / 2, (edges_v[1:] + edges_v[:-1]) / 2)
+    share = (domain.face_at(np.stack([u.ravel(), v.ravel()], axis=1)) >= 0).reshape(u.shape).astype(np.float64)
+    j, i = _border_cells(surface, edges_u, edges_v)
+    step = (np.arange(PARTS) + 0.5) / PARTS
+    u = (edges_u[i, None, None] + step * np.diff(edges_u)[i, None, None] + np.zeros((PARTS, 1))).ravel()
+    v = (edges_v[j, None, None] + step[:, None] * np.diff(edges_v)[j, None, None] + np.zeros(PARTS)).ravel()
+    inside = domain.face_at(np.stack([u, v], axis=1)) >= 0
+    count = inside.reshape(len(j), -1).sum(axis=1)
+    total = np.where(inside[:, None], values(u, v), 0.0).reshape(len(j), -1, 3).sum(axis=1)
+    some = count > 0
+    rho[j[some], i[some]] = total[some] / count[some, None]
+    share[j, i] = np.maximum(count / PARTS**2, LEAST_SHARE)
+    weight *= share
+
+
+def _border_cells(surface, edges_u, edges_v):
+    """Cells (j, i) that the border of a trimmed surface passes."""
+    A, B = surface.uv, surface.uv[following(surface.loop_start)]
+    count = np.ceil(np.abs(B - A).max(axis=1) * CELLS * PARTS).astype(np.int64) + 1
+    row = np.repeat(np.arange(len(A)), count)
+    t = (np.arange(len(row)) - np.repeat(np.cumsum(count) - count, count)) / count[row]
+    on = A[row] + t[:, None] * (B - A)[row]
+    i, j = (np.searchsorted(edges[1:-1], x, side="right") for edges, x in ((edges_u, on[:, 0]), (edges_v, on[:, 1])))
+    return np.divmod(np.unique(j * (len(edges_u) - 1) + i), len(edges_u) - 1)
+
+
+def on_map(surface, picture, repeat, w, h):
+    """Return rho (h, w, 3) float32 of a textured surface at the crossings of its w x h map, row 0 at v = 0, and
+    outside (h, w) bool: crossings no part of the surface needs, where rho is 0.
+
+    surface : NurbsSurface, TrimmedSurface or Mesh with T and charts
+    """
+    if isinstance(surface, Mesh):
+        return mesh_texture.evaluate(surface, picture, repeat, w, h)
+    wrap, collapsed = wraps(surface, repeat), collapsed_sides(surface)
+    return evaluate_picture(picture, repeat, w, h, wrap, collapsed, _box_of(surface)), np.zeros((h, w), dtype=bool)
+
+
+def level_on_map(surface, roots, level, picture_size, repeat, texture_level=10):
+    """Return the level of a textured surface's map (see common_level), whatever its kind."""
+    if isinstance(surface, Mesh):
+        return mesh_texture.common_level(surface, level, picture_size, repeat, texture_level)
+    shown = [tiles * length for tiles, (_, length) in zip(repeat, _parts(_box_of(surface)), strict=True)]
+    return common_level(roots, level, picture_size, shown, texture_level)
+
+
+def evaluate_picture(picture, repeat, w, h, wrap=(False, False), collapsed=(False,) * 4, box=WHOLE):
     """Return rho (h, w, 3) float32 of a picture at the crossings of a w x h map, row 0 at v = 0.
 
     wrap : the picture goes round at the border of u, of v (see `wraps`).
     collapsed : sides u=0, u=1, v=0, v=1 that are one point; all their texels get the mean of the row they would have.
+    box : u0, u1, v0, v1 of the part of the tiled [0, 1]^2 that the map shows
     """
     if w < 2 or h < 2:
         raise ValueError(f"map of {w} x {h} samples, expected at least 2 x 2")
-    rho = _at_crossings(_bottom_up(picture), h, repeat[1], wrap[1], axis=0)
-    rho = _at_crossings(rho, w, repeat[0], wrap[0], axis=1).astype(np.float32, copy=False)
+    part_u, part_v = _parts(box)
+    rho = _at_crossings(_bottom_up(picture), h, repeat[1], wrap[1], part_v, axis=0)
+    rho = _at_crossings(rho, w, repeat[0], wrap[0], part_u, axis=1).astype(np.float32, copy=False)
     np.clip(rho, 0, 1, out=rho)
-    if wrap[0] and float(repeat[0]).is_integer():
+    if wrap[0] and part_u[1] == 1 and float(repeat[0]).is_integer():
         rho[:, -1] = rho[:, 0]
-    if wrap[1] and float(repeat[1]).is_integer():
+    if wrap[1] and part_v[1] == 1 and float(repeat[1]).is_integer():
         rho[-1] = rho[0]
     for side, line in enumerate((np.s_[:, 0], np.s_[:, -1], np.s_[0], np.s_[-1])):
         if collapsed[side]:
@@ -97,71 +190,22 @@ def evaluate_picture(picture, repeat, w, h, wrap=(False, False), collapsed=(Fals
     return rho
 
 
-def _at_crossings(array, n_samples, repeat, wrap, axis):
-    n = array.shape[axis] * repeat
-    centre = np.arange(n_samples) * (n / (n_samples - 1))
-    spacing = n / (n_samples - 1)
+def _at_crossings(array, n_samples, repeat, wrap, part, axis):
+    (start, length), n = part, array.shape[axis] * repeat
+    spacing = n * length / (n_samples - 1)
+    centre = start * n + np.arange(n_samples) * spacing
     if spacing <= 1:
-        return _lerp(array, centre, wrap, axis)
+        return lerp(array, centre, wrap, axis)
     low, high = centre - spacing / 2, centre + spacing / 2
-    return _box(array, low, high, axis) if wrap else _box(array, np.maximum(low, 0), np.minimum(high, n), axis)
+    if wrap and length == 1:
+        return box_means(array, low, high, axis)
+    return box_means(array, np.maximum(low, start * n), np.minimum(high, (start + length) * n), axis)
 
 
 def _trapezoid(n):
     weight = np.full(n, 1 / (n - 1))
     weight[[0, -1]] /= 2
     return weight
-
-
-def _lerp(array, at, wrap, axis):
-    """Interpolate pixel centres (index + 0.5) linearly at `at` [pixels]; periodic, or clamped at the first and last."""
-    n = array.shape[axis]
-    at = at - 0.5
-    low = np.floor(at).astype(int)
-    t = (at - low).astype(array.dtype).reshape([-1 if k == axis else 1 for k in range(array.ndim)])
-    if wrap:
-        low, high = low % n, (low + 1) % n
-    else:
-        low, high = np.clip(low, 0, n - 1), np.clip(low + 1, 0, n - 1)
-    first = np.take(array, low, axis)
-    step = np.take(array, high, axis)
-    step -= first
-    step *= t
-    return np.add(first, step, out=step)
-
-
-def _box(array, low, high, axis):
-    """Return means over the intervals [low, high] [pixels] of a picture of constant squares, periodic."""
-    first = np.floor(low).astype(int)
-    n_taps = int((np.ceil(high) - first).max())
-    return _by_taps(array, low, high, first, n_taps, axis) if n_taps <= MAX_TAPS else _by_sums(array, low, high, axis)
-
-
-def _by_taps(array, low, high, first, n_taps, axis):
-    """Add up the pixels an interval touches, each by its share; float32 stays float32."""
-    shape = [-1 if k == axis else 1 for k in range(array.ndim)]
-    total = 0
-    for k in (first + tap for tap in range(n_taps)):
-        share = np.maximum(np.minimum(high, k + 1) - np.maximum(low, k), 0) / (high - low)
-        part = np.take(array, k % array.shape[axis], axis)
-        part *= share.astype(array.dtype).reshape(shape)
-        total += part
-    return total
-
-
-def _by_sums(array, low, high, axis):
-    """Subtract running sums (float64): the cost does not grow with the length of the intervals."""
-    array = np.moveaxis(array, axis, 0)
-    columns = (-1,) + (1,) * (array.ndim - 1)
-    total = np.zeros((len(array) + 1, *array.shape[1:]))
-    np.cumsum(array, axis=0, dtype=np.float64, out=total[1:])
-
-    def integral(x):
-        whole = np.floor(x).astype(int)
-        turns, k = np.divmod(whole, len(array))
-        return total[k] + turns.reshape(columns) * total[-1] + (x - whole).reshape(columns) * array[k]
-
-    return np.moveaxis((integral(high) - integral(low)) / (high - low).reshape(columns), 0, axis)
 
 
 def _bottom_up(picture):

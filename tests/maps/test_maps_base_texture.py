@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from lib.maps import base_texture as bt
+from lib.maps.pixels import box_means
 from lib.nurbs.evaluate import evaluate_grid
 from lib.nurbs.shape import collapsed_sides
 from lib.nurbs.surface import bilinear, from_points
@@ -151,7 +152,7 @@ def test_evaluation_commutes_with_mirroring_and_transposing(shape):
 def test_box_means_are_those_of_a_picture_drawn_out_in_tiny_squares(width):
     row = random_picture(1, 37)
     centre = np.linspace(0, 74, 9)
-    means = bt._box(row, centre - width / 2, centre + width / 2, axis=1)[0]
+    means = box_means(row, centre - width / 2, centre + width / 2, axis=1)[0]
     fine = (np.arange(4000) + 0.5) / 4000
     for k, c in enumerate(centre):
         at = np.floor(c - width / 2 + width * fine).astype(int) % 37
