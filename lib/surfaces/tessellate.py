@@ -95,9 +95,10 @@ def shapes(surfaces, takes_part):
         own = [surfaces[s] for s in whole]
         border, shell[whole] = find_borders.find(own, is_closed[whole], is_collapsed[whole], takes_part)
         border[:, [0, 2]] = whole[border[:, [0, 2]]]
+    sizes = np.array([(measure.area(s), *measure.extent(s)) for s in surfaces]).reshape(-1, 3)
     return Shapes(
-        np.array([measure.area(s) for s in surfaces]),
-        np.array([measure.extent(s) for s in surfaces]).reshape(-1, 2),
+        sizes[:, 0].copy(),
+        sizes[:, 1:].copy(),
         np.array([measure.is_planar(s) for s in surfaces]),
         is_closed,
         is_collapsed,

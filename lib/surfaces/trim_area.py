@@ -1,9 +1,12 @@
 """Integrals over the part of a surface inside its trims: area, mean lengths.
 
 By Green's theorem the integral of f over the inside of the loops is that of G dv along them, where G(u, v) is the
-integral of f(., v) from 0 to u.  Both are Gauss-Legendre sums over steps that cross no knot of the surface, where its
-derivatives jump.  Loops need no triangles for it, and one that crosses itself counts as often as it goes round.
+integral of f(., v) from 0 to u.  Steps cross no knot of the surface, where its derivatives jump.  Up to the last
+line before u, G is the antiderivative of a polynomial through Gauss-Legendre nodes, the same for all loops; the rest is
+a Gauss-Legendre sum.  Loops need no triangles for it, and one that crosses itself counts as often as it goes round.
 """
+
+from functools import lru_cache
 
 import numpy as np
 
@@ -12,20 +15,28 @@ from lib.surfaces.loops import following
 from lib.surfaces.trimmed import TrimmedSurface
 
 CELLS = 16  # steps over [0, 1], more where knots are nearer
-ACROSS = np.polynomial.legendre.leggauss(4)  # along u
-ALONG = np.polynomial.legendre.leggauss(3)  # along the loops
+NODES = np.polynomial.legendre.leggauss(5)  # in each cell, and from its side to the loop
+ALONG = {n: np.polynomial.legendre.leggauss(n) for n in (2, 3)}  # along each piece of a loop
+SHORT = 1 / 64  # pieces that rise less take two nodes, most of them, the others three
+REMEMBERED = 8  # surfaces
 
 
+@lru_cache(maxsize=REMEMBERED)
 def integrals(trim: TrimmedSurface):
     """Integrals of |S_u x S_v|, |S_u|, |S_v| and 1 over the (u, v) inside the loops: (4,)."""
     A, B = trim.uv, trim.uv[following(trim.loop_start)]
     steps = [_steps(knots) for knots in (trim.base.knots_u, trim.base.knots_v)]
     A, B = _split(A, B, steps)
-    x, weight = (ALONG[0] + 1) / 2, ALONG[1] / 2
-    uv = (A[:, None] + (B - A)[:, None] * x[:, None]).reshape(-1, 2)
-    dv = ((B - A)[:, 1:] * weight).ravel()
-    uv, dv = np.clip(uv[dv != 0], 0.0, 1.0), dv[dv != 0]
-    return dv @ _from_zero(trim.base, uv, steps[0])
+    A, B = A[A[:, 1] != B[:, 1]], B[A[:, 1] != B[:, 1]]
+    cell = [
+        np.clip(np.searchsorted(t, x, side="right") - 1, 0, len(t) - 2)
+        for t, x in zip(steps, (A + B).T / 2, strict=True)
+    ]
+    total = _up_to_lines(trim.base, A, B, cell, steps)
+    is_short = np.abs(B[:, 1] - A[:, 1]) < SHORT
+    for n, own in ((2, is_short), (3, ~is_short)):
+        total = total + _from_lines(trim.base, A[own], B[own], steps[0][cell[0][own]], ALONG[n])
+    return total
 
 
 def _steps(knots):
@@ -56,26 +67,45 @@ def _split(A, B, steps):
     return A[row] + t[:, None] * along, A[row] + end[:, None] * along
 
 
-def _from_zero(base, uv, lines):
-    """Integrals (n, 4) of |S_u x S_v|, |S_u|, |S_v| and 1 along u, from (0, v) to the points uv (n, 2)."""
-    x, weight = (ACROSS[0] + 1) / 2, ACROSS[1] / 2
-    width = np.diff(lines)
-    v, row = np.unique(uv[:, 1], return_inverse=True)
-    _, S_u, S_v = evaluate_grid(base, (lines[:-1, None] + width[:, None] * x).ravel(), v)
-    whole = _densities(S_u, S_v).reshape(v.size, width.size, x.size, 3)
-    whole = np.einsum("vcqk,q,c->vck", whole, weight, width)
-    whole = np.concatenate([np.zeros((v.size, 1, 3)), np.cumsum(whole, axis=1)], axis=1)
-    cell = np.clip(np.searchsorted(lines, uv[:, 0], side="right") - 1, 0, width.size - 1)
-    rest = uv[:, 0] - lines[cell]
-    u = lines[cell][:, None] + rest[:, None] * x
-    _, S_u, S_v = evaluate(base, u.ravel(), np.repeat(uv[:, 1], x.size))
-    part = _densities(S_u, S_v).reshape(len(uv), x.size, 3)
-    inside = whole[row.ravel(), cell] + np.einsum("nqk,q,n->nk", part, weight, rest)
-    return np.concatenate([inside, uv[:, :1]], axis=1)
+def _up_to_lines(base, A, B, cell, steps):
+    """What the pieces A-B (k, 2) of loops, each in its `cell` (u, v), sweep up to the side of the cell: (4,)."""
+    x, weight = (NODES[0] + 1) / 2, NODES[1] / 2
+    width, height = (np.diff(t) for t in steps)
+    u, v = ((t[:-1, None] + np.diff(t)[:, None] * x).ravel() for t in steps)
+    _, S_u, S_v = evaluate_grid(base, u, v)
+    swept = _densities(S_u, S_v).reshape(height.size, x.size, width.size, x.size, 4)
+    swept = np.cumsum(np.einsum("rqcpk,p,c->rqck", swept, weight, width), axis=2)
+    has_cells = cell[0] > 0
+    column, row = cell[0][has_cells] - 1, cell[1][has_cells]
+    start, end = (_antiderivatives((X[has_cells, 1] - steps[1][row]) / height[row]) for X in (A, B))
+    return np.einsum("nqk,nq,n->k", swept[row, :, column], end - start, height[row])
+
+
+def _antiderivatives(t):
+    """Integrals (n, q) from 0 to t (n,) of the polynomials that are 1 at one node and 0 at the others."""
+    x = (NODES[0] + 1) / 2
+    powers = np.arange(x.size)
+    coefficients = np.linalg.inv(x[:, None] ** powers)  # column q: of the polynomial of node q
+    return (t[:, None] ** (powers + 1) / (powers + 1)) @ coefficients
+
+
+def _from_lines(base, A, B, line, rule):
+    """What the pieces A-B (k, 2) sweep from u = line (k,): (4,)."""
+    along, dv = (rule[0] + 1) / 2, rule[1] / 2
+    x, weight = (NODES[0] + 1) / 2, NODES[1] / 2
+    at = A[:, None] + (B - A)[:, None] * along[:, None]
+    rest = at[..., 0] - line[:, None]
+    u = line[:, None, None] + rest[..., None] * x
+    v = np.broadcast_to(at[..., 1:], u.shape)
+    _, S_u, S_v = evaluate(base, *(np.clip(t.ravel(), 0.0, 1.0) for t in (u, v)))
+    values = _densities(S_u, S_v).reshape(*u.shape, 4)
+    return np.einsum("nqpk,p,nq,q,n->k", values, weight, rest, dv, (B - A)[:, 1], optimize=True)
 
 
 def _densities(S_u, S_v):
-    return np.stack([np.linalg.norm(x, axis=-1) for x in (np.cross(S_u, S_v), S_u, S_v)], axis=-1)
+    """|S_u x S_v|, |S_u|, |S_v| and 1: (..., 4)."""
+    lengths = [np.linalg.norm(x, axis=-1) for x in (np.cross(S_u, S_v), S_u, S_v)]
+    return np.stack([*lengths, np.ones(S_u.shape[:-1])], axis=-1)
 
 
 def area(trim: TrimmedSurface):
