@@ -40,23 +40,48 @@ def body(args, cost):
     levels = [asked if isinstance(asked, dict) else {"share": asked} for asked in args.levels]
     if not 0 <= args.level_index < len(levels):
         raise refusal(f"{args.level_index}, allowed are 0 to {len(levels) - 1}", field="level-index")
-    surfaces = tessellate.into_frame(x.surfaces, shapes.centre, shapes.scale)
+    own, of = np.flatnonzero(x.front < 0), shapes_of(x.front)
+    surfaces = tessellate.into_frame([x.surfaces[s] for s in own], shapes.centre, shapes.scale)
     k, asked = args.level_index, levels[args.level_index]
     try:
-        pieces = Scene(surfaces, shapes, lattice(x.names, args.textures, args.reconstruction))
+        lines = lattice(x.names, args.textures, args.reconstruction)
+        lines = {int(of[s]): joined(lines, np.flatnonzero(of == of[s])) for s in lines}
+        pieces = Scene(surfaces, known(shapes, own), lines, np.bincount(of))
         level = cut(pieces, levels, k, args.units, shapes.scale)
     except TooFine as error:
         raise refusal(f"{json.dumps(asked)} {error}", field=f"lods[{k}]") from None
     note = ""
     if level.is_smallest:
-        note = f"{level.asked} triangles asked for, these surfaces need {len(level.mesh.F)}"
+        note = (
+            f"{level.asked} triangles asked for, these surfaces need {np.bincount(of) @ np.diff(level.mesh.face_start)}"
+        )
     elif "deviation" in asked and level.mesh.distance.max() > level.tolerance:
         reached, wanted = level.mesh.distance.max() * shapes.scale, level.tolerance * shapes.scale
         note = f"{wanted:.3g} m asked for, {reached:.3g} m reached"
     if note and "share" not in asked:  # who asks for a share asks for no number: lods.json tells it
         door.warn(f"lods[{k}]: {note}")
-    lod_mesh.save(args.out, in_metres(level, shapes, np.asarray(x.flip, dtype=bool), k, asked, note))
-    cost.notes.update(level=k, triangles=len(level.mesh.F), distance=float(level.mesh.distance.max()) * shapes.scale)
+    made = in_metres(level, shapes, of, np.asarray(x.flip, dtype=bool), k, asked, note)
+    lod_mesh.save(args.out, made)
+    cost.notes.update(level=k, triangles=len(made.F), distance=float(made.distance.max()))
+
+
+def shapes_of(front):
+    """(n,) which of the shapes, numbered without the backs, each surface has."""
+    own = np.flatnonzero(front < 0)
+    return np.searchsorted(own, np.where(front < 0, np.arange(len(front)), front))
+
+
+def known(shapes, own):
+    """What is known of the surfaces `own` (k,) alone, numbered from 0."""
+    borders = shapes.borders.copy()
+    borders[:, [0, 2]] = np.searchsorted(own, borders[:, [0, 2]])
+    fields = ("area", "extent", "is_planar", "is_closed", "is_collapsed", "shell")
+    return tessellate.Shapes(**{field: getattr(shapes, field)[own] for field in fields}, borders=borders)
+
+
+def joined(lines, both):
+    """The lines (u, v) of all sides of a sheet."""
+    return tuple(np.unique(np.concatenate([lines[s][d] for s in both if s in lines])) for d in (0, 1))
 
 
 def lattice(names, textures, reconstruction):
@@ -85,7 +110,7 @@ def cut(pieces, levels, k, units, scale):
     finest = pieces.by_deviation(DEVIATION) if first is not levels[0] else cut(pieces, levels, 0, units, scale)
     if asked["share"] == 1:
         return finest
-    return pieces.by_count(int(asked["share"] * len(finest.mesh.F)))
+    return pieces.by_count(int(asked["share"] * (pieces.copies @ np.diff(finest.mesh.face_start))))
 
 
 def _deviation(asked, units, scale):
@@ -95,27 +120,38 @@ def _deviation(asked, units, scale):
     return length / scale
 
 
-def in_metres(level, shapes, flip, k, asked, note):
-    """The LodMesh of a Level: out of the frame, turned where the surface is."""
+def in_metres(level, shapes, of, flip, k, asked, note):
+    """The LodMesh of a Level: out of the frame, turned where the surface is; of (n,), the shape of each surface."""
     mesh, scale = level.mesh, shapes.scale
-    turned_vertex = np.repeat(flip, np.diff(mesh.vertex_start))
-    turned_face = np.repeat(flip, np.diff(mesh.face_start))
+    parts = [_part(level, shape, turned) for shape, turned in zip(of, flip, strict=True)]
+    vertex_start = np.cumsum([0, *(len(part[0]) for part in parts)]).astype(np.int64)
+    V, N, UV, F = (np.concatenate(field) for field in zip(*parts, strict=True))
+    face_start = np.cumsum([0, *(len(part[3]) for part in parts)]).astype(np.int64)
     return lod_mesh.LodMesh(
-        V=shapes.centre + scale * mesh.V,
-        N=np.where(turned_vertex[:, None], -level.N, level.N).astype(np.float32),
-        UV=mesh.UV,
-        F=np.where(turned_face[:, None], mesh.F[:, ::-1], mesh.F),
-        vertex_start=mesh.vertex_start,
-        face_start=mesh.face_start,
-        distance=mesh.distance * scale,
-        rms=mesh.rms * scale,
-        slide=mesh.slide * scale,
+        V=shapes.centre + scale * V,
+        N=N.astype(np.float32),
+        UV=UV,
+        F=F + np.repeat(vertex_start[:-1], np.diff(face_start))[:, None].astype(F.dtype),
+        vertex_start=vertex_start,
+        face_start=face_start,
+        distance=mesh.distance[of] * scale,
+        rms=mesh.rms[of] * scale,
+        slide=mesh.slide[of] * scale,
         level=k,
         asked=asked,
         tolerance=level.tolerance * scale,
         gap=level.gap * scale,
         note=note,
     )
+
+
+def _part(level, shape, turned):
+    """V, N, UV and F, counted from 0, of one of the shapes of a level."""
+    mesh = level.mesh
+    vertices, faces = (slice(*start[shape : shape + 2]) for start in (mesh.vertex_start, mesh.face_start))
+    F = mesh.F[faces] - np.int32(mesh.vertex_start[shape])
+    N = level.N[vertices]
+    return mesh.V[vertices], -N if turned else N, mesh.UV[vertices], F[:, ::-1] if turned else F
 
 
 def main(argv=None):

@@ -31,7 +31,7 @@ def body(args, cost):
     sag = float(args.settings.get("sag", SAG))
     if not 1e-6 <= sag <= 0.1:
         raise refusal(f"{sag:g}, allowed are 0.000001 to 0.1", field="sag")
-    made = make(x.surfaces, x.flip, x.role, sag)
+    made = make(x.surfaces, x.flip, x.role, sag, x.front)
     casters.save(args.out, made)
     cost.notes.update(
         triangles=len(made.F),
@@ -42,35 +42,44 @@ def body(args, cost):
     )
 
 
-def make(surfaces, flip, role, sag):
-    """The Casters of surfaces (n,), turned where flip (n,), with their role (n,), to `sag` of the frame."""
-    blocks = np.array([r != "receive_only" for r in role], dtype=bool)
-    centre, scale = tessellate.frame(surfaces)
-    surfaces = tessellate.into_frame(surfaces, centre, scale)
+def make(surfaces, flip, role, sag, front=None):
+    """The Casters of surfaces (n,), turned where flip (n,), with their role (n,), to `sag` of the frame.
+
+    front (n,) int: the surface whose back this is, or -1; backs have no triangles of their own.
+    """
+    front = np.full(len(surfaces), -1) if front is None else np.asarray(front)
+    own = np.flatnonzero(front < 0)
+    blocks = np.array([r != "receive_only" for r in role], dtype=bool)[own]
+    centre, scale = tessellate.frame([surfaces[s] for s in own])
+    surfaces = tessellate.into_frame([surfaces[s] for s in own], centre, scale)
     known = tessellate.shapes(surfaces, blocks)
     size = known.extent.max(axis=1)
     pieces = tessellate.Pieces(surfaces, known)
     patches = pieces.cut_within(np.minimum(sag, OWN_SAG * size), tessellate.SLIDE * size)
     mesh = tessellate.assemble(patches, surfaces, known)
-    F, face_surface = mesh.F.copy(), np.repeat(np.arange(len(surfaces), dtype=np.int32), np.diff(mesh.face_start))
-    F[np.asarray(flip, dtype=bool)[face_surface]] = F[np.asarray(flip, dtype=bool)[face_surface]][:, ::-1]
-    keep = blocks[face_surface]
+    F, face_own = mesh.F.copy(), np.repeat(np.arange(len(own)), np.diff(mesh.face_start))
+    turned = np.asarray(flip, dtype=bool)[own][face_own]
+    F[turned] = F[turned][:, ::-1]
+    keep = blocks[face_own]
+    of = np.searchsorted(own, np.where(front < 0, np.arange(len(front)), front))  # what each is the shape of
+    borders = known.borders.copy()
+    borders[:, [0, 2]] = own[borders[:, [0, 2]]]
     return casters.Casters(
         centre=centre,
         scale=scale,
         V=mesh.V,
         UV=mesh.UV,
         F=F[keep],
-        face_surface=face_surface[keep],
-        face_shell=(known.shell >= 0)[face_surface[keep]] | in_closed_shell(mesh.V, F[keep]),
-        area=known.area,
-        extent=known.extent,
-        sag=np.where(known.is_planar, 0.0, mesh.distance),
-        is_planar=known.is_planar,
-        is_closed=known.is_closed,
-        is_collapsed=known.is_collapsed,
-        shell=known.shell,
-        borders=known.borders,
+        face_surface=own[face_own[keep]].astype(np.int32),
+        face_shell=(known.shell >= 0)[face_own[keep]] | in_closed_shell(mesh.V, F[keep]),
+        area=known.area[of],
+        extent=known.extent[of],
+        sag=np.where(known.is_planar, 0.0, mesh.distance)[of],
+        is_planar=known.is_planar[of],
+        is_closed=known.is_closed[of],
+        is_collapsed=known.is_collapsed[of],
+        shell=known.shell[of],
+        borders=borders,
     )
 
 

@@ -28,7 +28,8 @@ BAKE = {
 
 
 def scene_of(surfaces):
-    """A Scene of {name: (surface, facts)}; facts may hold E, role, flip, group, is_black."""
+    """A Scene of {name: (surface, facts)}; facts may hold E, role, flip, group, is_black,
+    front (name of the surface whose back it is)."""
     names = sorted(surfaces)
     facts = [surfaces[name][1] for name in names]
     n = len(names)
@@ -36,7 +37,7 @@ def scene_of(surfaces):
         names=names,
         files=[f"{k:03d}-surface" for k in range(n)],
         surfaces=[surfaces[name][0] for name in names],
-        front=np.full(n, -1, dtype=np.int32),
+        front=np.array([names.index(f["front"]) if "front" in f else -1 for f in facts], dtype=np.int32),
         flip=np.array([f.get("flip", False) for f in facts]),
         role=[f.get("role", "full") for f in facts],
         E=np.array([np.broadcast_to(f.get("E", 0.0), 3) for f in facts], dtype=np.float64),
@@ -55,7 +56,7 @@ def cube(side=1.0, **facts):
 
 
 def casters_of(scene, sag=BAKE["sag"]):
-    return tessellate.make(scene.surfaces, scene.flip, scene.role, sag)
+    return tessellate.make(scene.surfaces, scene.flip, scene.role, sag, scene.front)
 
 
 def world_of(surfaces):

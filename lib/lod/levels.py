@@ -53,10 +53,12 @@ class Scene:
     """Surfaces (n,) in their frame, with what `tessellate.shapes` knows of them; levels are cut from it.
 
     lattice : {surface: (u, v)} interior parameters that have a line in every level, for light stored in vertices
+    copies : (n,) int, times each surface's triangles count (2 where both its sides are seen)
     """
 
-    def __init__(self, surfaces, known, lattice=None):
+    def __init__(self, surfaces, known, lattice=None, copies=None):
         self.surfaces, self.known = surfaces, known
+        self.copies = np.ones(len(surfaces), dtype=np.int64) if copies is None else np.asarray(copies)
         self.pieces = tessellate.Pieces(surfaces, known, lattice)
         self.size = known.extent.max(axis=1)
 
@@ -67,7 +69,7 @@ class Scene:
 
     def predicted(self, tolerance, pieces=None):
         """Triangles a chord tolerance will cost, before measuring."""
-        return int((pieces or self.pieces).n_triangles(*self.asked_of(tolerance)).sum())
+        return int((pieces or self.pieces).n_triangles(*self.asked_of(tolerance)) @ self.copies)
 
     def by_deviation(self, tolerance):
         """The Level whose measured distance is at most `tolerance` (> 0)."""
@@ -84,7 +86,7 @@ class Scene:
             if better is None:
                 break
             pieces = better
-        return self._level(patches, tolerance, asked, _count(patches) > asked)
+        return self._level(patches, tolerance, asked, self.count(patches) > asked)
 
     def _cut(self, asked, pieces):
         """(tolerance, patches) of at most `asked` triangles where that can be: what was cut may differ from what was
@@ -94,7 +96,7 @@ class Scene:
         for _ in range(ATTEMPTS):
             tolerance = self.tolerance_for(ask, pieces)
             patches = pieces.cut(*self.asked_of(tolerance))
-            count = _count(patches)
+            count = self.count(patches)
             if count <= asked or tolerance == COARSEST:
                 break
             ask = min(int(ask * asked / count), ask - 1)
@@ -135,6 +137,6 @@ class Scene:
             length = np.linalg.norm(total, axis=1, keepdims=True)
             return np.where(length > 0, total / np.maximum(length, 1e-300), [0.0, 0.0, 1.0])
 
-
-def _count(patches):
-    return sum(len(p.F) for p in patches)
+    def count(self, patches):
+        """Triangles of what was cut, one patch a surface."""
+        return int(np.array([len(p.F) for p in patches]) @ self.copies)

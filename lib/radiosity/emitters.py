@@ -162,8 +162,8 @@ def _cell_areas(surface, u, v, order=4):
 def gather_emitters(surfaces, flip, E, group):
     """Emitters of a scene.
 
-    surfaces : list of n NurbsSurface in the scene's frame, or Facets of other kinds; flip (n,) bool; E (n, 3) exitance, an emitter is E > 0;
-    group (n,) int.
+    surfaces : list of n NurbsSurface in the scene's frame, or Facets of other kinds; flip (n,) bool; E (n, 3) exitance,
+    an emitter is E > 0; group (n,) int.
     """
     lit = np.flatnonzero(np.asarray(E).max(axis=1, initial=0.0) > 0)
     parts = [surfaces[s] if isinstance(surfaces[s], Facets) else facets_of(surfaces[s], bool(flip[s])) for s in lit]

@@ -146,7 +146,11 @@ class World:
 
     @cached_property
     def _is_back_to_back(self):
-        return back_to_back([self.surface(s) for s in range(self.n)], self.scene.flip, 1.0)
+        S, front = self.scene.surfaces, self.scene.front
+        whole = [s for s in range(self.n) if isinstance(S[s], NurbsSurface) and front[s] < 0]
+        out = np.zeros(self.n, dtype=bool)
+        out[whole] = back_to_back([self.surface(s) for s in whole], np.asarray(self.scene.flip)[whole], 1.0)
+        return out
 
     @cached_property
     def mesh(self):
