@@ -6,7 +6,7 @@ from pathlib import Path, PurePosixPath
 from lib.formats.mistakes import listed
 
 LFS = b"version https://git-lfs"  # how the text begins that stands for a file where Git LFS is not installed
-MAX_BYTES = 256 << 20
+UNSEEN = 0.5  # reflectance of a material whose texture is not there, times the colour that multiplies the texture
 
 
 class Pictures:
@@ -24,6 +24,10 @@ class Pictures:
             self._faults.setdefault(fault, {})[name] = None
         return None if fault else PurePosixPath(name).as_posix()
 
+    def fault_of(self, name):
+        """Why `usable` gave None."""
+        return self._fault(name.strip().replace("\\", "/")) or "no fault"
+
     def fault(self, name, reason):
         """Note that a texture is not used."""
         self._faults.setdefault(reason, {})[name] = None
@@ -31,7 +35,7 @@ class Pictures:
     def notes(self):
         """One sentence, or none."""
         parts = [f"{listed(names)} ({reason})" for reason, names in self._faults.items()]
-        return [f"textures that are not used, plain colours instead: {'; '.join(parts)}"] if parts else []
+        return [f"textures that are not used, a plain colour instead: {'; '.join(parts)}"] if parts else []
 
     def _fault(self, name):
         path = PurePosixPath(name)

@@ -11,6 +11,7 @@ import math
 import re
 from pathlib import Path, PurePosixPath
 
+from lib.formats.mesh_pictures import UNSEEN
 from lib.formats.mistakes import listed
 
 MAX_BYTES = 16 << 20
@@ -98,6 +99,8 @@ def _material(found, folder, pictures):
                 material["repeat"] = list(scale)
             if len(set(colour)) == 1:
                 del material["reflectance"]
+        else:
+            material["reflectance"] = [UNSEEN] * 3 if len(set(colour)) == 1 else [UNSEEN * c for c in colour]
     return material
 
 

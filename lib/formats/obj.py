@@ -10,7 +10,7 @@ from collections import Counter
 import numpy as np
 
 from lib.formats import mtl, names
-from lib.formats.mesh_pictures import Pictures
+from lib.formats.mesh_pictures import UNSEEN, Pictures
 from lib.formats.mistakes import listed
 from lib.formats.obj_lines import BadLine, Lines
 from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch
@@ -67,6 +67,7 @@ def read(data, report, only=None, folder="."):
     for material in kept.values():
         if material.get("texture") in unused:
             material.pop("texture")
+            material.setdefault("reflectance", [UNSEEN] * 3)
     return GeometryFile(patches, total, notes=notes + pictures.notes(), materials=kept)
 
 

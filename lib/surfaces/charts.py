@@ -16,13 +16,12 @@ import xatlas
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from lib.surfaces.mesh import Mesh
 from lib.surfaces.mesh_build import normals_areas
 
 PADDING = 4  # cells of the finest level between charts, and from the border: one cell two levels coarser
 LEAST_LEVEL, MOST_LEVEL = 3, 11
 AREA = 1e6
-TRIALS = 6  # packings until the map is as full as can be
+TRIALS = 4  # packings until the map is nearly full
 MOST_STRETCH = 3.0  # of the mesh's own texture coordinates, between any two directions or places of a chart
 SLIVER = 0.05, 0.1  # length, in units, and height over it, at least: given to triangles that xatlas ignores
 SMALL = 1e-5  # area the largest triangle of a chart is given at least; xatlas ignores what is below 1e-7
@@ -188,7 +187,9 @@ def _packed(mesh, flat, index, chart, texel):
     flat = flat * np.sqrt(np.maximum(SMALL / largest, 1.0))[chart][:, None, None]
     points = np.empty((int(index.max()) + 1, 2))
     points[index.ravel()[::-1]] = flat.reshape(-1, 2)[::-1]  # the first of each counts
-    density = min(1 / texel, 2 * 2**MOST_LEVEL / np.sqrt(AREA))
+    low, high = _boxes(flat, chart, n)
+    most = min(2**MOST_LEVEL / np.sqrt(AREA), 2**MOST_LEVEL / (high - low).max())  # beyond, it can not fit
+    density = min(1 / texel, 1.5 * most)
     tried, level = [], None
     for _ in range(TRIALS):
         corners = _pack(points, index, chart, n, density)
@@ -212,7 +213,7 @@ def _next_density(tried, room):
     """Cells per unit to try next, for a map of `room`, from those tried with what they needed; None if that is full."""
     fits = max((trial[:2] for trial in tried if trial[1] <= room), default=(0.0, 0.0))
     over = min((trial[:2] for trial in tried if trial[1] > room), default=(np.inf, np.inf))
-    if fits[1] > 0.96 * room or over[0] < 1.01 * fits[0]:
+    if fits[1] > 0.9 * room or over[0] < 1.02 * fits[0]:
         return None
     if not fits[0]:
         low = 2 * PADDING
@@ -236,9 +237,7 @@ def _pack(points, index, chart, n, density):
         is_placed[np.asarray(atlas.get_mesh_chart(0, k).faces)] = True
     corners = _moved(points[index], corners, np.where(is_placed, chart, n), chart, n)
     # Charts are stretched to whole cells; the box of each comes out within float32 of them.
-    low, high = np.full((n, 2), np.inf), np.full((n, 2), -np.inf)
-    np.minimum.at(low, chart, corners.min(axis=1))
-    np.maximum.at(high, chart, corners.max(axis=1))
+    low, high = _boxes(corners, chart, n)
     low_whole = np.round(low - 0.5)
     size_whole = np.maximum(np.round(high - 0.5) - low_whole, 1.0)
     size = np.where(high > low, high - low, 1.0)
@@ -268,6 +267,14 @@ def _moved(flat, corners, placed, chart, n):
     B = np.stack([mean(da[:, i] * db[:, j]) for i in (0, 1) for j in (0, 1)], axis=1).reshape(n, 2, 2)
     M = np.linalg.solve(A, B)
     return np.einsum("ijk,ikl->ijl", flat - mean_a[chart][:, None], M[chart]) + mean_b[chart][:, None]
+
+
+def _boxes(flat, chart, n):
+    """Least and largest coordinates of each chart: (n, 2), (n, 2)."""
+    low, high = np.full((n, 2), np.inf), np.full((n, 2), -np.inf)
+    np.minimum.at(low, chart, flat.min(axis=1))
+    np.maximum.at(high, chart, flat.max(axis=1))
+    return low, high
 
 
 def _signed_areas(flat):
