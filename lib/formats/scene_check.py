@@ -8,7 +8,7 @@ from lib.formats import artefact, geometry_file, pictures, scene, scene_import, 
 from lib.formats.mistakes import Mistakes
 from lib.maps.base_texture import rho_average
 from lib.maps.budget import gpu_bytes, smallest_total
-from lib.nurbs.tessellate import frame
+from lib.surfaces.tessellate import frame
 from lib.refusal import Refusal
 from lib.surfaces.measure import extent
 from lib.surfaces.mesh import Mesh

@@ -12,10 +12,10 @@ import numpy as np
 
 from lib.formats import geometry_file, names, scene_geometry
 from lib.formats.scene import Scene
-from lib.nurbs import tessellate
 from lib.nurbs.coincident import coincident
 from lib.nurbs.surface import NurbsSurface
 from lib.refusal import refusal
+from lib.surfaces import tessellate
 from lib.surfaces.measure import hull, transformed
 from lib.surfaces.mesh import Mesh
 
