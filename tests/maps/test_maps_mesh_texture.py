@@ -191,10 +191,11 @@ def test_even_light_keeps_its_mean_on_a_mesh(shape, repeat):
         ((514, 1), UNIT, 3, 10, 10),
         ((512, 512), UNIT / 4, 3, 10, 7),
         ((512, 512), UNIT * 4, 3, 10, 10),  # the cap decides
-        ((1, 1), UNIT, 3, 10, 4),  # charts stay apart
+        ((1, 1), UNIT, 0, 10, 2),  # charts stay apart
         ((1, 1), UNIT, 6, 10, 6),  # the light decides
         ((1, 1), UNIT, 6, 2, 6),
-        ((512, 512), 0 * UNIT, 0, 10, 4),  # one colour
+        ((512, 512), 0 * UNIT, 0, 10, 2),  # one colour
+        ((512, 512), UNIT, 0, 1, 1),
     ],
 )
 def test_common_level_of_a_mesh(size, T, level, cap, expected):

@@ -1,6 +1,7 @@
 """apply_base_texture through its door: a plain wall, a painted wall and a lamp in two light groups."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,6 +11,7 @@ from lib.maps import base_texture
 from lib.maps.colour import srgb_to_linear
 from lib.maps.mapset import pack
 from lib.nurbs.surface import bilinear
+from lib.surfaces.mesh import Mesh
 from stages import apply_base_texture
 
 ROUND = 1e-5  # float32 maps
@@ -170,6 +172,33 @@ def test_textures_lie_below_the_folder_of_the_scene(tmp_path):
     (tmp_path / "folder.json").write_text(json.dumps({"folder": str(tmp_path)}))
     run(tmp_path, options)
     assert (tmp_path / "out.npz").read_bytes() == whole
+
+
+def charted_mesh():
+    """A unit square, two triangles in the middle of its map; its picture lies turned by 90 degrees, T = (v, 1 - u)."""
+    corner = np.array([[0, 0], [1, 0], [1, 1], [0, 1.0]])
+    F = np.array([[0, 1, 2], [0, 2, 3]], dtype=np.int32)
+    T = np.stack([corner[:, 1], 1 - corner[:, 0]], axis=1)
+    V, N = np.concatenate([corner, np.zeros((4, 1))], axis=1), np.tile([0, 0, 1.0], (2, 3, 1))
+    return Mesh(V, F, N, T[F], (0.25 + corner / 2)[F], np.zeros(2, np.int32), 3)
+
+
+def test_a_painted_mesh(tmp_path):
+    """Its picture is white in the top left quarter, T (0..1/2, 1/2..1): u 0..1/2, v 0..1/2 of the square."""
+    codes = np.zeros((16, 16, 3), np.uint8)
+    codes[:8, :8] = 255
+    hidden = [np.ones((9, 9), bool), np.zeros((3, 3), bool)]
+    hidden[0][2:7, 2:7] = False
+    H = [np.where(hidden[0][..., None, None], 1e6, np.ones((9, 9, 2, 3))), np.ones((3, 3, 2, 3))]
+    _, rho_avg, options = build(tmp_path, H, hidden, codes)
+    x = scene.load(tmp_path / "scene.npz")
+    scene.save(tmp_path / "scene.npz", replace(x, surfaces=[x.surfaces[0], charted_mesh(), x.surfaces[2]]))
+    out = run(tmp_path, options)[1]
+    assert np.allclose(rho_avg, 0.25) and out.final.level.tolist() == [5, 1]  # 16 pixels on half of the map
+    final, away = out.final.map(0)[..., 0], out.final.hidden_map(0)
+    assert not away[8:25, 8:25].any() and away[:7].all() and away[:, 26:].all()
+    assert np.allclose(final[9:16, 9:16], 2, rtol=ROUND)  # H rho, H = 2
+    assert not final[17:24, 9:24].any() and not final[9:24, 17:24].any()
 
 
 def test_same_input_same_bytes(tmp_path):
