@@ -92,11 +92,12 @@ def evaluate(mesh, picture, repeat, w, h):
     for first in range(0, len(rows), AT_ONCE):
         j, i = rows[first : first + AT_ONCE], columns[first : first + AT_ONCE]
         uv = np.stack([i / (w - 1), j / (h - 1)], axis=1)
-        places = domain.locate(uv)
-        at = np.where(places.is_inside[:, None], uv, places.uv)
-        weight = barycentric(mesh.uv[places.face], at)
-        values = pyramid.values(np.einsum("nk,nkc->nc", weight, T[places.face]), width[places.face])
-        rho[j, i] = np.clip(values, 0, 1)
+        face = domain.face_at(uv)
+        beside = np.flatnonzero(face < 0)
+        nearest = domain.locate(uv[beside])
+        uv[beside], face[beside] = nearest.uv, nearest.face
+        at = np.einsum("nk,nkc->nc", barycentric(mesh.uv[face], uv), T[face])
+        rho[j, i] = np.clip(pyramid.values(at, width[face]), 0, 1)
     return rho, ~needed
 
 
