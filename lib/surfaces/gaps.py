@@ -17,6 +17,8 @@ def gap(mesh, surfaces, known):
     for a, side_a, b, side_b, is_reversed in known.borders.tolist():
         first, second = mesh.V[mesh.side[a][side_a]], mesh.V[mesh.side[b][side_b]]
         largest = max(largest, _between(first, second[::-1] if is_reversed else second))
+    if not any(isinstance(s, NurbsSurface | TrimmedSurface) for s in surfaces):
+        return largest  # meshes alone: their borders are where their files put them
     rows = _Rows(mesh, surfaces, known)
     for i, j in rows.pairs(known.borders):
         largest = max(largest, _between(rows.line(i), rows.line(j)))
@@ -60,8 +62,14 @@ class _Rows:
         known = np.array(known, dtype=np.int64).reshape(-1, 2)
         for i, j in find_borders.same_curve(self.data, self.usable, known):
             (s, k), (t, m) = self.owner[i], self.owner[j]
-            if not (s == t and s in self.first and k // 2 == m // 2 and self.is_closed[s, k // 2]):
+            is_seam = s == t and s in self.first and k // 2 == m // 2 and self.is_closed[s, k // 2]
+            if not is_seam and self._are_one(self.data.points[i], self.data.points[j], self.data.length[i]):
                 yield i, j
+
+    def _are_one(self, a, b, length):
+        """Also between the places where curves are compared first."""
+        far = max(find_borders.to_polyline(a, b), find_borders.to_polyline(b, a))
+        return far <= find_borders.SAME_CURVE * length
 
 
 def runs(trim):

@@ -11,6 +11,8 @@ from lib.surfaces.loops import following
 
 SHAPE = 0.15  # of an edge's length: points that stand out by more are kept, so that arcs and rings stay recognisable
 
+LESS, LOWER = 0.9, (0.2, 0.7)  # of the share of its tolerance that an edge needs, and what is taken at once
+
 
 @dataclass(frozen=True)
 class Borders:
@@ -41,12 +43,16 @@ class Borders:
         """(k,) bool: the points kept with the tolerances of the positions (places,)."""
         return self.significance > at_place[self.place]
 
-    def lowered(self, at_place, edges, factor):
-        """The tolerances (places,) with those of the inner points of `edges` times the factor."""
-        rows = np.isin(self.edge, edges) & np.isfinite(self.significance)
-        out = at_place.copy()
-        out[np.unique(self.place[rows])] *= factor
-        return out
+    def lowered(self, at_place, unfit):
+        """The tolerances (places,) with those of the inner points of edges lowered; unfit : pairs of edges (e,) and
+        the share of the tolerance they need, of which a little less than most is taken.
+        """
+        factor = np.ones(len(at_place))
+        inner = np.isfinite(self.significance)
+        for edges, share in unfit:
+            rows = np.isin(self.edge, edges) & inner
+            np.minimum.at(factor, self.place[rows], np.clip(LESS * share, *LOWER))
+        return at_place * factor
 
 
 def borders(surfaces):

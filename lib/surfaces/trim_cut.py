@@ -7,8 +7,7 @@ from lib.nurbs.evaluate import normal
 from lib.surfaces.trim_border import borders
 from lib.surfaces.trim_mesh import ROUNDS, Lines, Unfit, scales, triangulate
 
-LOWER = 0.5  # the next tolerance of an edge that does not do
-PATIENCE = 12  # times an edge's tolerance is lowered: to 2e-4 of the first
+PATIENCE = 12  # times an edge's tolerance is lowered: to 2e-4 of the first or less
 ROUGH_ROUNDS, FAR_OFF = 1, 1.3  # of putting points inside, where a count is asked for; where the distance is so large
 
 
@@ -62,7 +61,13 @@ class TrimmedPieces:
         return self._cut(tolerance, slide, 1.0, ROUNDS)
 
     def _cut(self, tolerance, slide, factor, rounds):
-        lines, at_place = self._lines(tolerance, slide), self.borders.tolerances(tolerance)
+        lines = self._lines(tolerance, slide)
+        # Find border points that do, by the first triangles; then put points inside
+        at_place, _ = self._attempt(self.borders.tolerances(tolerance), lines, factor * tolerance, 0)
+        return self._attempt(at_place, lines, factor * tolerance, rounds)[1]
+
+    def _attempt(self, at_place, lines, tolerance, rounds):
+        """Tolerances of positions (places,) at which all surfaces can be cut, and their patches."""
         patches, kept = [None] * len(self.surfaces), [None] * len(self.surfaces)
         for attempt in range(PATIENCE + 1):
             keep, unfit = self.borders.kept(at_place), []
@@ -73,14 +78,14 @@ class TrimmedPieces:
                     continue
                 is_last = own.all() or attempt == PATIENCE
                 try:
-                    patches[s] = triangulate(surface, own, lines[s], factor * tolerance[s], rounds, is_last)
+                    patches[s] = triangulate(surface, own, lines[s], tolerance[s], rounds, is_last)
                     kept[s] = own
                 except Unfit as error:
-                    unfit.append(np.unique(self.borders.edge[first + error.points]))
+                    unfit.append((self.borders.edge[first + error.points], error.share))
             if not unfit:
                 break
-            at_place = self.borders.lowered(at_place, np.unique(np.concatenate(unfit)), LOWER)
-        return patches
+            at_place = self.borders.lowered(at_place, unfit)
+        return at_place, patches
 
     def learned(self, patches, tolerance, slide):
         """None: cutting already puts right what is far off."""

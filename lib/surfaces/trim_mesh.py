@@ -13,8 +13,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from lib.nurbs.evaluate import evaluate
-from lib.nurbs.facets import Patch, normals
+from lib.nurbs.facets import Patch
 from lib.surfaces.loops import following, inside_loops
+from lib.surfaces.trim_distance import distances
 from lib.surfaces.trim_flat import without_flat
 from lib.surfaces.trim_nodes import creases, nodes
 from lib.surfaces.trimmed import TrimmedSurface
@@ -25,17 +26,19 @@ LEAST_SHARE = 0.3  # of its area that a loop keeps
 ROUNDS = 12  # of measuring and putting points where a triangle is too far off
 BESIDE = 1.2  # of the distance at its border edges that a triangle may have inside
 PATIENCE, LITTLE = 3, 0.7  # rounds after which the area too far off must fall by so much in each
-MANY = 300  # triangles; with more, fewer samples in each tell the distance
 NOTHING = 1e-14  # of the whole: a region smaller than this is rounding's
 AT_ONCE = 1_000_000  # pairs of edges compared
 
 
 class Unfit(ValueError):
-    """These border points do not do: `points`, indices into the surface's border, are on the edges that need more."""
+    """These border points do not do.
 
-    def __init__(self, points):
+    points : indices into the surface's border, on the edges that need more;  share : of the tolerance they need
+    """
+
+    def __init__(self, points, share=0.5):
         super().__init__(f"border points {points[:8]}")
-        self.points = points
+        self.points, self.share = points, share
 
 
 @dataclass(frozen=True)
@@ -142,22 +145,26 @@ def triangulate(trim, keep, lines, tolerance, rounds=ROUNDS, is_last=False):
     if not is_last:
         _check_areas(trim, border, uv, edges)
     uv = np.concatenate([uv, nodes(uv[edges[:, 0]], uv[edges[:, 1]], lines.u, lines.v)])
-    worst = np.inf
+    off = np.linalg.norm(evaluate(trim.base, *np.clip(uv[: len(S)], 0, 1).T)[0] - S, axis=1)  # by the file's tolerance
+    worst, found = np.inf, None
     for turn in range(rounds + 1):
         F, uv = _triangles(trim, border, uv, edges, lines, is_last)
         S = np.concatenate([S, evaluate(trim.base, *np.clip(uv[len(S) :], 0, 1).T)[0]])
-        F = without_flat(S, F, edges)
-        measured = _measured(trim.base, S, uv, F)
-        at_border = _at_border(measured, F, edges, len(S))
-        if turn == 0 and not is_last and (at_border > tolerance).any():
-            raise Unfit(_real(border, _border_ends(F[at_border > tolerance], edges, len(S))))
-        failing = measured.height > np.maximum(tolerance, BESIDE * at_border)
-        excess = measured.area_of[failing].sum()
-        if not excess or turn == rounds or (turn > PATIENCE and excess > LITTLE * worst):
+        found, F = distances(trim.base, S, uv, without_flat(S, F, edges), found)
+        allowed = tolerance + np.append(off, np.zeros(len(S) - len(off)))[F].max(axis=1)
+        is_border = _is_border(F, edges, len(S))
+        at_border = np.where(is_border, found.on_edge, 0.0).max(axis=1)  # no point inside can change it
+        stuck = at_border > allowed
+        if stuck.any() and not is_last:
+            ends = np.stack([F, np.roll(F, -1, axis=1)], axis=-1)[stuck][is_border[stuck]]
+            raise Unfit(_real(border, ends.ravel()), float((allowed[stuck] / at_border[stuck]).min()))
+        failing = found.height > np.where(stuck, BESIDE * at_border, allowed)
+        excess = found.area[failing].sum()
+        if not failing.any() or turn == rounds or (turn > PATIENCE and excess > LITTLE * worst):
             break
         worst = min(worst, excess)
         uv = np.concatenate([uv, _between(uv * lines.scale, F[failing], edges) / lines.scale])
-    return _patch(trim, keep, border, S, uv, F, measured)
+    return _patch(trim, keep, border, S, uv, F, found)
 
 
 def _kept_loops(trim, keep, is_last):
@@ -286,54 +293,13 @@ def _between(x, F, edges):
     return np.unique(new, axis=0)
 
 
-@dataclass(frozen=True)
-class _Measured:
-    height: np.ndarray  # (m,) largest distance from each facet's plane
-    on_edge: np.ndarray  # (m, 3) that of the samples on the edge from corner k to the next
-    area_of: np.ndarray  # (m,)
-    square: float  # mean, weighted by area
-    slide: float
-
-
-def _samples(n):
-    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
-    w = np.stack([i, j, n - i - j], axis=-1).reshape(-1, 3)
-    return w[(w >= 0).all(axis=1) & (w < n).all(axis=1)] / n
-
-
-FEW_SAMPLES, MANY_SAMPLES = np.concatenate([_samples(2), _samples(3)]), _samples(4)
-
-
-def _measured(base, S, uv, F):
-    """How far the exact surface is from the triangles, at samples of each."""
-    weights = MANY_SAMPLES if len(F) <= MANY else FEW_SAMPLES
-    at = np.clip(np.einsum("qk,mkc->mqc", weights, uv[F]), 0.0, 1.0).reshape(-1, 2)
-    off = evaluate(base, at[:, 0], at[:, 1])[0].reshape(len(F), -1, 3) - np.einsum("qk,mkc->mqc", weights, S[F])
-    normal, area = normals(*(S[F[:, k]] for k in range(3)))
-    height = np.abs(np.einsum("mqc,mc->mq", off, normal))
-    on_edge = np.stack([height[:, weights[:, (k + 2) % 3] == 0].max(axis=1) for k in range(3)], axis=1)
-    square = float((height**2).mean(axis=1) @ area) / max(float(area.sum()), 1e-300)
-    slide = float(np.linalg.norm(off, axis=2).max(initial=0.0))
-    return _Measured(height.max(axis=1), on_edge, area, square, slide)
-
-
 def _is_border(F, edges, n):
     """(m, 3) bool: the edge from corner k to the next is one of `edges`, of n points."""
     key = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=-1), axis=-1) @ [n, 1]
     return np.isin(key, np.sort(edges, axis=1) @ [n, 1])
 
 
-def _at_border(measured, F, edges, n):
-    """(m,) largest distance of each triangle's samples on border edges: no point inside can change it."""
-    return np.where(_is_border(F, edges, n), measured.on_edge, 0.0).max(axis=1)
-
-
-def _border_ends(F, edges, n):
-    is_border = _is_border(F, edges, n)
-    return np.concatenate([F[is_border], np.roll(F, -1, axis=1)[is_border]])
-
-
-def _patch(trim, keep, border, S, uv, F, measured):
+def _patch(trim, keep, border, S, uv, F, found):
     """The Patch of the vertices that triangles use or that lie on the border."""
     used = np.zeros(len(S), dtype=bool)
     used[F.ravel()] = True
@@ -341,16 +307,16 @@ def _patch(trim, keep, border, S, uv, F, measured):
     number = np.cumsum(used) - 1
     vertex = np.full(len(trim.uv), -1, dtype=np.int64)
     vertex[border[border >= 0]] = number[np.flatnonzero(border >= 0)]
-    distance = max(float(measured.height.max(initial=0.0)), border_distance(trim, keep))
+    area = float(found.area.sum())
     return Patch(
         S[used],
         np.clip(uv[used], 0.0, 1.0),
         number[F],
         sides(trim, vertex),
-        distance,
-        measured.square,
-        measured.slide,
-        float(measured.area_of.sum()),
+        max(float(found.height.max(initial=0.0)), border_distance(trim, keep)),
+        float(found.square @ found.area) / max(area, 1e-300),
+        float(found.slide.max(initial=0.0)),
+        area,
     )
 
 

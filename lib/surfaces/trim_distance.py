@@ -1,0 +1,69 @@
+"""How far the exact surface is from triangles between points of it, by samples of each triangle."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from lib.nurbs.evaluate import evaluate
+from lib.nurbs.facets import normals
+
+MANY = 300  # triangles; with more, fewer samples in each tell the distance
+
+
+def _samples(n):
+    """Barycentric weights (q, 3) of the points of a triangle in steps of 1 / n, but for the corners."""
+    i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
+    w = np.stack([i, j, n - i - j], axis=-1).reshape(-1, 3)
+    return w[(w >= 0).all(axis=1) & (w < n).all(axis=1)] / n
+
+
+FEW_SAMPLES, MANY_SAMPLES = np.concatenate([_samples(2), np.full((1, 3), 1 / 3)]), _samples(4)
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Of m triangles, each named by its corners.
+
+    key (m,) int64; height (m,) largest distance from the facet's plane; on_edge (m, 3) that of the samples on the edge
+    from corner k to the next; square (m,) mean; slide (m,) largest whole vector; area (m,)
+    """
+
+    key: np.ndarray
+    height: np.ndarray
+    on_edge: np.ndarray
+    square: np.ndarray
+    slide: np.ndarray
+    area: np.ndarray
+
+
+def distances(base, S, uv, F, before=None):
+    """The Distances of triangles F (m, 3) of points S (k, 3) at uv (k, 2) from the surface `base`; those that have
+    the same corners in `before` are not measured again.
+    """
+    turn = np.argmin(F, axis=1)
+    first = F[np.arange(len(F))[:, None], (turn[:, None] + np.arange(3)) % 3]
+    key = (first[:, 0] << 42) + (first[:, 1] << 21) + first[:, 2]
+    is_new = np.ones(len(F), dtype=bool) if before is None else ~np.isin(key, before.key)
+    new = _measured(base, S, uv, first[is_new], MANY_SAMPLES if len(F) <= MANY else FEW_SAMPLES)
+    out = [np.empty((len(F), *x.shape[1:])) for x in new]
+    for whole, part in zip(out, new, strict=True):
+        whole[is_new] = part
+    if before is not None:
+        order = np.argsort(before.key)
+        old = order[np.searchsorted(before.key, key[~is_new], sorter=order)]
+        known = (before.height, before.on_edge, before.square, before.slide, before.area)
+        for whole, part in zip(out, known, strict=True):
+            whole[~is_new] = part[old]
+    height, on_edge, square, slide, area = out
+    return Distances(key, height, on_edge, square, slide, area), first
+
+
+def _measured(base, S, uv, F, weights):
+    at = np.clip(np.einsum("qk,mkc->mqc", weights, uv[F]), 0.0, 1.0).reshape(-1, 2)
+    off = evaluate(base, at[:, 0], at[:, 1])[0].reshape(len(F), -1, 3) - np.einsum("qk,mkc->mqc", weights, S[F])
+    normal, area = normals(*(S[F[:, k]] for k in range(3)))
+    height = np.abs(np.einsum("mqc,mc->mq", off, normal))
+    on_edge = [height[:, weights[:, (k + 2) % 3] == 0].max(axis=1, initial=0.0) for k in range(3)]
+    slide = np.linalg.norm(off, axis=2).max(axis=1, initial=0.0)
+    height, square = height.max(axis=1, initial=0.0), (height**2).mean(axis=1)
+    return height, np.stack(on_edge, axis=1), square, slide, area
