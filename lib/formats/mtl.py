@@ -78,9 +78,7 @@ def parse(data, folder, pictures):
         if "map_ke" in found and max(found.get("ke", (1.0,))) > 0:
             glowing.append(name)
     if glowing:
-        faults.append(
-            f"emission textures are not read: {listed(glowing)} {'emit' if len(glowing) > 1 else 'emits'} none"
-        )
+        faults.append(f"emission textures are not read; no light comes from {listed(glowing)}")
     return made, faults
 
 

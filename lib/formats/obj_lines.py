@@ -106,9 +106,7 @@ class Lines:
         body, n_words, _ = self.without_comments(lines)
         short = np.flatnonzero(n_words < least)
         if len(short):
-            raise BadLine(
-                self.number[lines[short[0]]], f"expected {least} numbers after `{word}`", self, lines[short[0]]
-            )
+            raise self.bad(lines[short[0]], f"expected {least} numbers after `{word}`")
         values = _converted(body, np.float64)
         if values is None or len(values) != n_words.sum():
             raise self._not_a_number(lines, f"expected {least} numbers after `{word}`")
