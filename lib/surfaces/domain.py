@@ -125,6 +125,14 @@ class Domain:
         down = np.broadcast_to(np.array([0, 0, -1], dtype=np.float32), origins.shape)
         return self._tracer.closest(origins, np.ascontiguousarray(down)).face.astype(np.int64)
 
+    def chart_at(self, uv):
+        """(n,) chart at, or nearest to, each of uv (n, 2)."""
+        face = self.face_at(uv)
+        out = np.flatnonzero(face < 0)
+        if out.size:
+            face[out] = self._border[2][self._tree.query(uv[out])[1]]
+        return self.chart[face]
+
     def coverage(self, rows, columns):
         """What the cells of a uniform grid hold: (chart of the first (rows, columns) int64, -1 where nothing; bool,
         more than one)."""
@@ -172,7 +180,7 @@ class Domain:
                 corner[dj : dj + rows, di : di + columns] |= needed
         j, i = np.nonzero(corner)
         owner = np.full(corner.shape, -1, dtype=np.int64)
-        owner[j, i] = self.locate(np.stack([i / columns, j / rows], axis=1)).chart
+        owner[j, i] = self.chart_at(np.stack([i / columns, j / rows], axis=1))
         straddling = is_mixed.copy()
         for dj in (0, 1):
             for di in (0, 1):
