@@ -49,6 +49,7 @@ def read(folder, overrides=None):
         index = len(settings["geometry"])
         settings["geometry"] = [*settings["geometry"], entry]
         settings["materials"] = {STUDIO: {"emission": STUDIO_EMISSION}, **settings["materials"]}
+        settings.setdefault("camera", before(placed, settings["units"], settings["up"]))
         placed = placed + [replace(one, entry=index) for one in load([entry]).placed]
     table = scene_table.resolve(settings, placed, where, strict=False)
     backs = with_backs(placed, both_sides(placed, table))
@@ -72,6 +73,16 @@ def studio(placed, units, up):
         "rectangle": {"origin": origin.tolist(), "u": u.tolist(), "v": v.tolist()},
         "material": STUDIO,
     }
+
+
+def before(placed, units, up):
+    """The camera of a model that stands alone: outside, a little above, from where all of it is in the picture."""
+    S = np.concatenate([points(one.surface) for one in placed]) / METRES[units]
+    low, high = S.min(axis=0), S.max(axis=0)
+    eye = np.array([0.8, -1.15, 0.7] if up == "z" else [0.8, 0.7, 1.15])
+    centre = (low + high) / 2
+    eye = centre + eye * float(np.linalg.norm(high - low))
+    return {"eye": eye.tolist(), "target": centre.tolist(), "fov": 40}
 
 
 def both_sides(placed, table):
