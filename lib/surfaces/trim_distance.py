@@ -60,7 +60,8 @@ def distances(base, S, uv, F, before=None):
 
 def _measured(base, S, uv, F, weights):
     at = np.clip(np.einsum("qk,mkc->mqc", weights, uv[F]), 0.0, 1.0).reshape(-1, 2)
-    off = evaluate(base, at[:, 0], at[:, 1])[0].reshape(len(F), -1, 3) - np.einsum("qk,mkc->mqc", weights, S[F])
+    exact = evaluate(base, at[:, 0], at[:, 1])[0].reshape(len(F), len(weights), 3)
+    off = exact - np.einsum("qk,mkc->mqc", weights, S[F])
     normal, area = normals(*(S[F[:, k]] for k in range(3)))
     height = np.abs(np.einsum("mqc,mc->mq", off, normal))
     on_edge = [height[:, weights[:, (k + 2) % 3] == 0].max(axis=1, initial=0.0) for k in range(3)]

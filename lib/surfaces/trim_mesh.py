@@ -17,15 +17,16 @@ from lib.nurbs.facets import Patch
 from lib.surfaces.loops import following, inside_loops
 from lib.surfaces.trim_distance import distances
 from lib.surfaces.trim_flat import without_flat
+from lib.surfaces.trim_flip import flipped
 from lib.surfaces.trim_nodes import creases, nodes
 from lib.surfaces.trimmed import TrimmedSurface
 
 NOT_ALLOWED = pythoncdt.IntersectingConstraintEdges.NOT_ALLOWED
 TRY_RESOLVE = pythoncdt.IntersectingConstraintEdges.TRY_RESOLVE
 LEAST_SHARE = 0.3  # of its area that a loop keeps
-ROUNDS = 12  # of measuring and putting points where a triangle is too far off
+ROUNDS = 20  # of measuring and putting points where a triangle is too far off
 BESIDE = 1.2  # of the distance at its border edges that a triangle may have inside
-PATIENCE, LITTLE = 3, 0.7  # rounds after which the area too far off must fall by so much in each
+PATIENCE, LESS = 4, 0.9  # rounds in which the area too far off must fall to so much of the least so far
 NOTHING = 1e-14  # of the whole: a region smaller than this is rounding's
 AT_ONCE = 1_000_000  # pairs of edges compared
 
@@ -146,11 +147,14 @@ def triangulate(trim, keep, lines, tolerance, rounds=ROUNDS, is_last=False):
         _check_areas(trim, border, uv, edges)
     uv = np.concatenate([uv, nodes(uv[edges[:, 0]], uv[edges[:, 1]], lines.u, lines.v)])
     off = np.linalg.norm(evaluate(trim.base, *np.clip(uv[: len(S)], 0, 1).T)[0] - S, axis=1)  # by the file's tolerance
-    worst, found = np.inf, None
+    found, least, better = None, np.inf, 0
     for turn in range(rounds + 1):
-        F, uv = _triangles(trim, border, uv, edges, lines, is_last)
+        F, uv, fixed = _triangles(trim, border, uv, edges, lines, is_last)
         S = np.concatenate([S, evaluate(trim.base, *np.clip(uv[len(S) :], 0, 1).T)[0]])
         found, F = distances(trim.base, S, uv, without_flat(S, F, edges), found)
+        if (found.height > tolerance).any():
+            F = flipped(trim.base, S, uv, F, found.height > tolerance, fixed)
+            found, F = distances(trim.base, S, uv, without_flat(S, F, edges), found)
         allowed = tolerance + np.append(off, np.zeros(len(S) - len(off)))[F].max(axis=1)
         is_border = _is_border(F, edges, len(S))
         at_border = np.where(is_border, found.on_edge, 0.0).max(axis=1)  # no point inside can change it
@@ -160,10 +164,10 @@ def triangulate(trim, keep, lines, tolerance, rounds=ROUNDS, is_last=False):
             raise Unfit(_real(border, ends.ravel()), float((allowed[stuck] / at_border[stuck]).min()))
         failing = found.height > np.where(stuck, BESIDE * at_border, allowed)
         excess = found.area[failing].sum()
-        if not failing.any() or turn == rounds or (turn > PATIENCE and excess > LITTLE * worst):
+        better, least = (turn, excess) if excess < LESS * least else (better, least)
+        if not failing.any() or turn == rounds or turn - better == PATIENCE:
             break
-        worst = min(worst, excess)
-        uv = np.concatenate([uv, _between(uv * lines.scale, F[failing], edges) / lines.scale])
+        uv = np.concatenate([uv, _between(uv, F[failing], np.where(is_border, -1.0, found.on_edge)[failing])])
     return _patch(trim, keep, border, S, uv, F, found)
 
 
@@ -233,7 +237,9 @@ def _signed(A, B):
 
 
 def _triangles(trim, border, uv, edges, lines, is_last):
-    """Triangles (m, 3) of the points and the points, more of them where loops cross and this is the last resort."""
+    """Triangles (m, 3) of the points, the points, more of them where loops cross and this is the last resort, and the
+    edges (e, 2) that must stay.
+    """
     more = creases(uv, uv[edges[:, 0]], uv[edges[:, 1]], lines.kinks)
     try:
         F = _inside(uv * lines.scale, edges, more)
@@ -243,13 +249,13 @@ def _triangles(trim, border, uv, edges, lines, is_last):
             raise Unfit(_real(border, edges[own].ravel())) from None
         if is_last:
             points, F = _crossed(uv * lines.scale, edges)
-            return F, np.concatenate([uv, (points / lines.scale)[len(uv) :]])
+            return F, np.concatenate([uv, (points / lines.scale)[len(uv) :]]), edges
         F = _inside(uv * lines.scale, edges, more[:0])
     A, B, C = (uv[F[:, k]] for k in range(3))
     found, expected = _signed2(A, B, C).sum(), _signed(uv[edges[:, 0]], uv[edges[:, 1]]).sum()
     if abs(found - expected) > 1e-6 * abs(expected) and not is_last:  # a hole that came to lie outside
         raise Unfit(_real(border, np.arange(len(border))))
-    return F, uv
+    return F, uv, np.concatenate([edges, more])
 
 
 def _signed2(A, B, C):
@@ -280,17 +286,13 @@ def _turn(a, b, c):
     return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0])
 
 
-def _between(x, F, edges):
-    """New points (n, 2) for triangles F (m, 3) of points x (k, 2): the middle of the longest edge that is no border,
-    or of the triangle.
+def _between(uv, F, on_edge):
+    """New points (n, 2) for triangles F (m, 3) of points uv (k, 2): the middle of the edge that is farthest off, or of
+    the triangle if `on_edge` (m, 3) is negative for all of them.
     """
-    ends = np.stack([F, np.roll(F, -1, axis=1)], axis=-1)
-    length = np.linalg.norm(x[ends[..., 1]] - x[ends[..., 0]], axis=-1)
-    length[_is_border(F, edges, len(x))] = -1.0
-    k = np.argmax(length, axis=1)
-    row = np.arange(len(F))
-    new = np.where((length[row, k] < 0)[:, None], x[F].mean(axis=1), x[ends[row, k]].mean(axis=1))
-    return np.unique(new, axis=0)
+    k, row = np.argmax(on_edge, axis=1), np.arange(len(F))
+    middle = (uv[F[row, k]] + uv[F[row, (k + 1) % 3]]) / 2
+    return np.unique(np.where((on_edge.max(axis=1) < 0)[:, None], uv[F].mean(axis=1), middle), axis=0)
 
 
 def _is_border(F, edges, n):
