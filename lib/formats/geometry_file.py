@@ -17,12 +17,13 @@ KINDS = {
 PACKED = (".zip", ".gz", ".7z", ".rar", ".tar", ".tgz", ".bz2", ".xz", ".zst")
 
 
-def read(path, file, name, only=None, trimmed="refuse"):
+def read(path, file, name, only=None, trimmed="keep", root=None):
     """Read the geometry file at `path` as a GeometryFile.
 
     file, name : the path and the entry's name as the user wrote them, for messages
     only : pattern of layers, groups, objects, materials or patch numbers, or None
-    trimmed : "refuse" or "skip" faces with trims
+    trimmed : "keep", "skip" or "refuse" faces with trims
+    root : the scene's folder, where textures of a .3dm may lie too, or None
 
     Raises Refusal, listing every mistake found in the file.
     """
@@ -39,7 +40,7 @@ def read(path, file, name, only=None, trimmed="refuse"):
     if kind == ".3dm":
         from lib.formats import threedm
 
-        content = threedm.read(data, report, only, trimmed)
+        content = threedm.read(data, report, only, trimmed, path.parent, root)
     elif kind == ".obj":
         from lib.formats import obj
 

@@ -35,7 +35,7 @@ class Body:
         self.faces = [brep.Faces[index] for index in range(len(brep.Faces))]
         self.is_whole = [_is_whole(face) for face in self.faces]
         self.is_solid = bool(brep.IsSolid)
-        self._edges = {}
+        self._edges, self._surfaces = {}, {}
 
     def __len__(self):
         return len(self.faces)
@@ -49,10 +49,12 @@ class Body:
 
         Raises ValueError, `FIELD: what`, if it has none.
         """
-        whole = nurbs_surface(self.faces[index].UnderlyingSurface())
-        if plain or all(self.is_whole):
-            return whole
-        return trimmed(whole, _Face(whole, self.faces[index], self._edge, self._vertex).loops())
+        if index not in self._surfaces:
+            surface = nurbs_surface(self.faces[index].UnderlyingSurface())
+            if not plain and not all(self.is_whole):
+                surface = trimmed(surface, _Face(surface, self.faces[index], self._edge, self._vertex).loops())
+            self._surfaces[index] = surface
+        return self._surfaces[index]
 
     def _vertex(self, index):
         return _xyz(self.brep.Vertices[index].Location)

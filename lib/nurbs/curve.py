@@ -9,7 +9,8 @@ import numpy as np
 
 from lib.nurbs.evaluate import basis
 
-MOST_SPLITS = 12  # halvings of a span: 1 / 4096 of it is finer than any tolerance asks for
+MARGIN = 1.1  # more parts than the middle asks for, so that the next round finds little to mend
+ROUNDS = 4  # of cutting: the first counts the parts, the others mend where the curve bends unevenly
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,23 +46,38 @@ def polyline(curve, share=1e-5, least=2, most=500):
         t = _split(t, 3)
     S = curve_points(curve, t)
     within = share * max(float(np.ptp(S, axis=0).max()), 1e-300)
-    # Halve every piece whose middle is off its chord; a parabola's is off by a quarter after each halving
-    for _ in range(MOST_SPLITS if curve.degree > 1 else 0):
-        middle = (t[:-1] + t[1:]) / 2
-        M = curve_points(curve, middle)
-        far = off_chord(M, S[:-1], S[1:]) > within
-        room = most - t.size
-        if not far.any() or room <= 0:
+    # Cut every piece whose middle is off its chord: n parts are off by 1 / n^2 of it where the curve is a parabola
+    for _ in range(ROUNDS if curve.degree > 1 else 0):
+        off = off_chord(curve_points(curve, (t[:-1] + t[1:]) / 2), S[:-1], S[1:])
+        parts = np.sqrt(off / within)
+        if not (parts > 1).any():
             break
-        t = np.sort(np.concatenate([t, middle[far][:room]]))
+        parts = MARGIN * parts
+        if np.ceil(parts).clip(1).sum() > most - 1:
+            t = _split(t, _fitting(parts, most - 1))
+            break
+        t = _split(t, np.ceil(parts).clip(1).astype(int))
         S = curve_points(curve, t)
-    return curve_points(curve, _split(t, -(-(least - 1) // (t.size - 1)))) if t.size < least else S
+    t = _split(t, -(-(least - 1) // (t.size - 1))) if t.size < least else t
+    return curve_points(curve, t)
+
+
+def _fitting(parts, most):
+    """Whole parts of the pieces in the ratio of `parts`, as many as `most` allows."""
+    low, high = 0.0, 1.0
+    for _ in range(30):
+        middle = (low + high) / 2
+        fits = np.ceil(middle * parts).clip(1).sum() <= most
+        low, high = (middle, high) if fits else (low, middle)
+    return np.ceil(low * parts).clip(1).astype(int)
 
 
 def _split(t, parts):
-    """Each interval of t cut into `parts` equal ones."""
-    steps = np.arange(parts) / parts
-    return np.append((t[:-1, None] + np.diff(t)[:, None] * steps).ravel(), t[-1])
+    """Each interval of t cut into `parts` equal ones, a number or (t.size - 1,) of them."""
+    parts = np.broadcast_to(parts, t.size - 1)
+    piece = np.repeat(np.arange(t.size - 1), parts)
+    step = np.arange(piece.size) - (np.cumsum(parts) - parts)[piece]
+    return np.append(t[piece] + (t[piece + 1] - t[piece]) * (step / parts[piece]), t[-1])
 
 
 def off_chord(points, start, end):
