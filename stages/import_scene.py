@@ -3,8 +3,12 @@
 reads   geometry-<hash>.json    the slice of the settings for geometry, roles and light     (lib.formats.scene_import)
         folder.json beside it, and the geometry files in the folder it names
 writes  scene.npz                                                                           (lib.formats.scene)
+
+    python -m stages.import_scene --describe PATH      lists what a file or a scene folder holds (stages.describe)
 """
 
+import os
+import sys
 from pathlib import Path
 
 from lib import door
@@ -26,6 +30,9 @@ def body(args, cost):
 
 
 def main(argv=None):
+    argv = sys.argv[1:] if argv is None else argv
+    if argv[:1] == ["--describe"]:  # a program of its own: an edit there must not re-bake anything
+        os.execv(sys.executable, [sys.executable, "-m", "stages.describe", *argv[1:]])
     return door.run(__doc__, arguments, body, argv)
 
 

@@ -1,12 +1,16 @@
 """Lists what a geometry file or a scene folder holds, for a user who has to name or light it."""
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
 
 from lib.formats import geometry_file, scene_model
 from lib.formats.scene_table import reflectance
-from lib.nurbs.shape import area, collapsed_sides, is_closed
+from lib.surfaces import measure
+from lib.surfaces.frames import whole
+from lib.surfaces.mesh import Mesh
+from lib.surfaces.trimmed import TrimmedSurface
 
 
 def lines(path):
@@ -16,14 +20,23 @@ def lines(path):
 
 
 def _file(path):
-    content = geometry_file.read(path, str(path), path.stem, trimmed="skip")
+    content = geometry_file.read(path, str(path), path.stem)
     unit = "states no unit" if content.metres is None else f"its unit is {content.metres:g} m"
-    head = f"{path}: {geometry_file.KINDS[path.suffix.lower()]}, {content.total} surfaces, {unit}"
-    rows = [("number", *_SHAPE, "layer or name")]
+    axis = f", {content.up} up" if content.up else ""
+    kinds = Counter(_kind(patch.surface) for patch in content.patches)
+    sheets = sum(patch.solid is False for patch in content.patches)
+    counted = [f"{n} {kind}" for kind, n in sorted(kinds.items())] + ([f"{sheets} of open sheets"] if sheets else [])
+    kind = geometry_file.KINDS[path.suffix.lower()]
+    head = f"{path}: {kind}, {content.total} surfaces ({', '.join(counted)}), {unit}{axis}"
+    rows = [("number", *_SHAPE, "material", "layer or name")]
     for patch in content.patches:
         labels = ", ".join(patch.labels[:-2])  # the last two are its number
-        rows.append((patch.labels[-1], *_shape(patch.surface, patch.flip), labels))
-    return [head, *_table(rows), *_trimmed(content.trimmed), *content.notes]
+        number = patch.labels[-1] if patch.labels else str(patch.number)
+        rows.append((number, *_shape(patch.surface, patch.flip), patch.material or "", labels))
+    materials = [f"material {name}: {_material(material)}" for name, material in sorted(content.materials.items())]
+    shining = [name for name, material in content.materials.items() if max(_rgb(material.get("emission", 0.0))) > 0]
+    light = f"materials that shine: {', '.join(sorted(shining))}" if shining else "no material shines"
+    return [head, *_table(rows), *materials, light, *_trimmed(content.trimmed), *content.notes]
 
 
 def _folder(path):
@@ -41,21 +54,36 @@ def _folder(path):
     return [f"{head}, {made.up} up, light groups: {', '.join(made.groups)}", *_table(rows), *materials, *made.warnings]
 
 
-_SHAPE = ("degrees", "points", "rational", "closed", "poles", "turned", "area")
+_SHAPE = ("kind", "degrees", "points", "rational", "loops", "closed", "poles", "turned", "area")
+
+
+def _kind(surface):
+    return {TrimmedSurface: "trimmed", Mesh: "mesh"}.get(type(surface), "whole")
 
 
 def _shape(surface, flip, size=None):
-    """Cells about the shape of a surface, in the order of _SHAPE."""
-    closed = "".join(letter for letter, shut in zip("uv", is_closed(surface), strict=True) if shut)
+    """Cells about the shape of a surface, in the order of _SHAPE: a mesh has triangles instead of degrees."""
+    area = f"{measure.area(surface) if size is None else size:.4g}"
+    turned = "yes" if flip else ""
+    if isinstance(surface, Mesh):
+        return "mesh", f"{len(surface.F)} tri", str(len(surface.V)), "", "", "", "", turned, area
+    closed = "".join(letter for letter, shut in zip("uv", measure.is_closed(surface), strict=True) if shut)
+    nurbs = whole(surface)
     return (
-        f"{surface.degree_u} x {surface.degree_v}",
-        "{} x {}".format(*surface.Pw.shape[:2]),
-        "yes" if np.ptp(surface.w) > 0 else "",
+        _kind(surface),
+        f"{nurbs.degree_u} x {nurbs.degree_v}",
+        "{} x {}".format(*nurbs.Pw.shape[:2]),
+        "yes" if np.ptp(nurbs.w) > 0 else "",
+        str(len(surface.loop_start) - 1) if isinstance(surface, TrimmedSurface) else "",
         closed,
-        str(int(collapsed_sides(surface).sum()) or ""),
-        "yes" if flip else "",
-        f"{area(surface) if size is None else size:.4g}",
+        str(int(measure.collapsed_sides(surface).sum()) or ""),
+        turned,
+        area,
     )
+
+
+def _rgb(value):
+    return value if isinstance(value, list) else [value] * 3
 
 
 def _material(material):
@@ -70,7 +98,7 @@ def _trimmed(numbers):
     if not numbers:
         return []
     listed = ", ".join(map(str, numbers[:40])) + (", ..." if len(numbers) > 40 else "")
-    return [f"trimmed, read only with `trimmed: skip`, which leaves them out: {listed}"]
+    return [f"left out: {listed}"]
 
 
 def _table(rows):

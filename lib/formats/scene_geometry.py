@@ -16,6 +16,7 @@ from lib.nurbs.surface import bilinear, from_points
 from lib.refusal import Refusal, refusal
 from lib.surfaces.measure import area, hull, transformed
 
+BRIGHTEST = 0.9  # reflectance of a file's material: files say how white a thing looks, and nothing reflects all light
 TRIMMED = "keep"  # what happens to trimmed faces of a file
 FLAT = 1e-13  # area over squared size below which a surface is a line or a point: rounding of its coordinates
 
@@ -72,6 +73,8 @@ class _Brought:
         names_of, folder = {}, PurePosixPath(file).parent
         for name, material in content.materials.items():
             material = dict(material)
+            if "reflectance" in material:
+                material["reflectance"] = np.minimum(material["reflectance"], BRIGHTEST).tolist()
             written = material.get("texture", "")
             if written.startswith("embedded:"):
                 data = content.pictures[written.removeprefix("embedded:")]
