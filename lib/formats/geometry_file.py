@@ -13,17 +13,19 @@ MAX_MESH_TEXT = 192 << 20  # an OBJ takes some twelve times its size
 KINDS = {
     ".bpt": "Bezier patches", ".txt": "Bezier patches (teaset)", ".json": "geomdl JSON", ".3dm": "Rhino",
     ".obj": "Wavefront", ".glb": "glTF", ".gltf": "glTF",
+    ".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES",
 }  # fmt: skip
 PACKED = (".zip", ".gz", ".7z", ".rar", ".tar", ".tgz", ".bz2", ".xz", ".zst")
 
 
-def read(path, file, name, only=None, trimmed="keep", root=None):
+def read(path, file, name, only=None, trimmed="keep", root=None, cache=None):
     """Read the geometry file at `path` as a GeometryFile.
 
     file, name : the path and the entry's name as the user wrote them, for messages
     only : pattern of layers, groups, objects, materials or patch numbers, or None
     trimmed : "keep", "skip" or "refuse" faces with trims
     root : the scene's folder, where textures of a .3dm may lie too, or None
+    cache : folder where conversions of STEP and IGES files are kept, or None
 
     Raises Refusal, listing every mistake found in the file.
     """
@@ -34,7 +36,12 @@ def read(path, file, name, only=None, trimmed="keep", root=None):
     if kind not in KINDS:
         allowed = ", ".join(f"{suffix} ({what})" for suffix, what in KINDS.items())
         raise refusal(f"files of kind '{kind}' are not read; allowed: {allowed}", file, name, "file")
-    most = {".3dm": MAX_BYTES, ".glb": MAX_BYTES, ".gltf": MAX_BYTES, ".obj": MAX_MESH_TEXT}.get(kind, MAX_TEXT)
+    is_step = KINDS[kind] in ("STEP", "IGES")
+    most = (
+        MAX_BYTES
+        if is_step
+        else {".3dm": MAX_BYTES, ".glb": MAX_BYTES, ".gltf": MAX_BYTES, ".obj": MAX_MESH_TEXT}.get(kind, MAX_TEXT)
+    )
     data = read_bytes(path, file, name, most)
     report = Report(Mistakes(), file, name)
     if kind == ".3dm":
@@ -49,6 +56,10 @@ def read(path, file, name, only=None, trimmed="keep", root=None):
         from lib.formats import gltf_mesh
 
         content = gltf_mesh.read(data, report, only, path.parent)
+    elif is_step:
+        from lib.formats import step
+
+        content = step.read(path, data, report, only, trimmed, cache)
     elif kind == ".json":
         from lib.formats import geomdl_json
 
