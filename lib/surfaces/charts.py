@@ -22,8 +22,11 @@ PADDING = 4  # cells of the finest level between charts, and from the border: on
 LEAST_LEVEL, MOST_LEVEL = 3, 11
 AREA = 1e6
 TRIALS = 4  # packings until the map is nearly full
-MOST_STRETCH = 3.0  # of the mesh's own texture coordinates, between any two directions or places of a chart
-SLIVER = 0.05, 0.1  # length, in units, and height over it, at least: given to triangles that xatlas ignores
+MOST_STRETCH = 3.0  # of the mesh's own texture coordinates, between any two directions or places of a chart ...
+BAD_SHARE = 0.01  # ... but for this share of the area
+SHORT = 0.01  # side that a triangle in a chart of its own is given at least
+MOST_DRAWN = 10.0  # how often longer a triangle laid flat with others may get
+LEAST_SHARE = 0.01  # of its area that a triangle keeps when laid flat with others
 SMALL = 1e-5  # area the largest triangle of a chart is given at least; xatlas ignores what is below 1e-7
 
 
@@ -45,8 +48,8 @@ def charted(mesh, texel):
 def own_charts(mesh, texel):
     """As charted, with pieces and shapes of the mesh's own texture coordinates; None where those do not serve.
 
-    They serve if no piece is folded over, overlaps itself or is stretched by more than MOST_STRETCH.  Where the pieces
-    lie does not matter: they are packed anew.
+    They serve if no piece is folded over, overlaps itself or is stretched by more than MOST_STRETCH (but for
+    BAD_SHARE).  Where the pieces lie does not matter: they are packed anew.
     """
     if mesh.T is None:
         return None
@@ -62,7 +65,8 @@ def own_charts(mesh, texel):
     area = normals_areas(mesh.V, mesh.F)[1] / unit**2
     flat = flat * np.sqrt(np.bincount(chart, area) / np.bincount(chart, np.abs(signed)))[chart][:, None, None]
     low, high = stretch(mesh.V / unit, mesh.F, flat)
-    if low.min() < 1 / MOST_STRETCH or high.max() > MOST_STRETCH or (high > MOST_STRETCH * low).any():
+    bad = (low < 1 / MOST_STRETCH) | (high > MOST_STRETCH) | (high > MOST_STRETCH * low)
+    if area[bad].sum() > BAD_SHARE * area.sum():
         return None
     made = _packed(mesh, flat, index, chart, texel / unit)
     return None if overlap(made) > 0 else made
@@ -141,19 +145,32 @@ def _cut(mesh, unit):
         piece = atlas.get_mesh_chart(0, k)
         chart[np.asarray(piece.faces)] = k
         plane[k] = piece.type == xatlas.ChartType.Planar
-    # Triangles that xatlas ignores, too small for float32, are charts of their own.
-    lost = np.flatnonzero(chart < 0)
-    chart[lost] = len(plane) + np.arange(len(lost))
-    n = len(plane) + len(lost)
-    plane = np.concatenate([plane, np.zeros(len(lost), dtype=bool)])
-    length = np.maximum(np.linalg.norm(V[mesh.F[lost, 1]] - V[mesh.F[lost, 0]], axis=1), SLIVER[0])
-    flat[lost] = length[:, None, None] * np.array([[0.0, 0.0], [1.0, 0.0], [0.5, SLIVER[1]]])
-    area = np.abs(_signed_areas(flat))
-    true = normals_areas(V, mesh.F)[1]
-    scale = np.sqrt(np.bincount(chart, true, n) / np.bincount(chart, area, n))
-    scale[len(plane) - len(lost) :] = 1.0
-    flat *= scale[chart][:, None, None]
-    return np.where(plane[chart][:, None, None], _projected(V, mesh.F, chart, n), flat), chart
+    true, n = normals_areas(V, mesh.F)[1], len(plane)
+    known = chart >= 0
+    flat = np.where(plane[chart][:, None, None], _projected(V, mesh.F, np.maximum(chart, 0), n), flat)
+    signed = _signed_areas(flat)
+    sign, area, real = (np.bincount(chart[known], x[known], n) for x in (signed, np.abs(signed), true))
+    scale = np.where(plane, 1.0, np.sqrt(real / np.maximum(area, 1e-300)))
+    flat *= np.minimum(scale, 1e6)[chart][:, None, None]
+    # Triangles that xatlas ignores, lays on a line or upside down, draws out or leaves alone get charts of their own.
+    good = known & (_signed_areas(flat) * np.sign(sign)[chart] > LEAST_SHARE * true)
+    good &= (stretch(V, mesh.F, flat)[1] < MOST_DRAWN) & (np.bincount(chart[known], minlength=n)[chart] > 1)
+    lost = np.flatnonzero(~good)
+    flat[lost], chart[lost] = _alone(V, mesh.F[lost]), n + np.arange(len(lost))
+    return flat, np.unique(chart, return_inverse=True)[1]
+
+
+def _alone(V, F):
+    """Corners (m, 3, 2) of triangles laid flat one by one, slivers a little wider than they are."""
+    a, b = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
+    length = np.linalg.norm(a, axis=1)
+    unit = a / length[:, None]
+    along = np.einsum("ij,ij->i", b, unit)
+    height = np.linalg.norm(b - along[:, None] * unit, axis=1)
+    flat = np.zeros((len(F), 3, 2))
+    flat[:, 1, 0], flat[:, 2, 0] = np.maximum(length, SHORT), along
+    flat[:, 2, 1] = np.maximum(height, 4 * SMALL / flat[:, 1, 0])
+    return flat
 
 
 def _projected(V, F, chart, n):
@@ -219,6 +236,9 @@ def _next_density(tried, room):
         low = 2 * PADDING
         return over[0] * max(0.97 * (room - low) / (over[1] - low), 0.25)
     if over[0] == np.inf:
+        if len(tried) > 1 and tried[-1][1] > tried[-2][1]:  # much of it is the space between charts: a line
+            slope = (tried[-1][1] - tried[-2][1]) / (tried[-1][0] - tried[-2][0])
+            return min(fits[0] + (0.96 * room - fits[1]) / slope, 8 * fits[0])
         return fits[0] * min(0.98 * room / fits[1], 8.0)
     return fits[0] + (over[0] - fits[0]) * (0.97 * room - fits[1]) / (over[1] - fits[1])
 
