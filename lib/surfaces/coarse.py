@@ -3,9 +3,12 @@
 import numpy as np
 
 from lib.nurbs.evaluate import evaluate, evaluate_grid
+from lib.surfaces.measure import is_planar
 from lib.surfaces.mesh import Mesh
 from lib.surfaces.trimmed import TrimmedSurface
 
+ROUGH, LEAST = 0.02, 4  # of the size; points of a loop
+ROUNDS = 2  # of dividing the triangles of a curved trimmed surface
 LINES = np.linspace(0.0, 1.0, 9)
 
 
@@ -23,11 +26,32 @@ def coarse(surface):
 
 
 def _trimmed(trim):
-    from lib.surfaces.trim_mesh import TRY_RESOLVE, triangles  # a library of its own: only where there are trims
+    from lib.surfaces.trim_mesh import domain_triangles  # a library of its own: only where there are trims
 
-    k = len(trim.uv)
-    after = np.arange(1, k + 1)
-    after[trim.loop_start[1:] - 1] = trim.loop_start[:-1]
-    inner = np.stack(np.meshgrid(LINES[1:-1], LINES[1:-1]), axis=2).reshape(-1, 2)
-    uv, F = triangles(np.concatenate([trim.uv, inner]), np.stack([np.arange(k), after], axis=1), TRY_RESOLVE)
+    uv, F = domain_triangles(_simplified(trim))
+    for _ in range(ROUNDS if not is_planar(trim) else 0):
+        uv, F = _divided(uv, F)
     return evaluate(trim.base, uv[:, 0], uv[:, 1])[0], F
+
+
+def _simplified(trim):
+    """The trimmed surface with fewer border points: corners, and what stands out by ROUGH of the size."""
+    bound = ROUGH * np.ptp(trim.S, axis=0).max()
+    keep, start = trim.significance > bound, trim.loop_start
+    for a, b in zip(start[:-1], start[1:], strict=True):
+        if keep[a:b].sum() < LEAST:
+            keep[a + (np.arange(LEAST) * (b - a)) // LEAST] = True
+    count = [int(keep[a:b].sum()) for a, b in zip(start[:-1], start[1:], strict=True)]
+    loops = np.cumsum([0, *count]).astype(np.int64)
+    return TrimmedSurface(trim.base, trim.box, trim.uv[keep], loops, trim.S[keep], trim.significance[keep])
+
+
+def _divided(uv, F):
+    """Each triangle in four, at the middles of its edges."""
+    edge = np.sort(F[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
+    edge, which = np.unique(edge, axis=0, return_inverse=True)
+    a, b, c = F.T
+    x, y, z = (len(uv) + which.reshape(-1, 3)).T
+    uv = np.concatenate([uv, uv[edge].mean(axis=1)])
+    parts = np.stack([[a, z, y], [z, b, x], [y, x, c], [x, y, z]])
+    return uv, parts.transpose(2, 0, 1).reshape(-1, 3)

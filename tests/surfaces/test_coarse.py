@@ -1,0 +1,33 @@
+"""Rough triangles of surfaces of every kind: their areas and sides are right."""
+
+import numpy as np
+import pytest
+
+from lib.surfaces.coarse import coarse
+from lib.surfaces.trimmed import TrimmedSurface
+from tests.shapes import rectangle, sphere
+
+
+def areas(surface):
+    """Vectors of the triangles: half the cross products."""
+    V, F = coarse(surface)
+    return np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]) / 2
+
+
+def test_a_rectangle_and_a_sphere():
+    assert areas(rectangle([0, 0, 0], [2, 0, 0], [0, 3, 0])).sum(axis=0) == pytest.approx([0, 0, 6])
+    assert np.linalg.norm(areas(sphere()), axis=1).sum() == pytest.approx(4 * np.pi, rel=0.1)
+
+
+def test_a_disc_cut_out_of_a_square():
+    """The square of side 2 with a round hole of radius 1/2."""
+    t = -np.arange(200) / 200 * 2 * np.pi  # a hole runs clockwise
+    hole = 0.5 + 0.25 * np.stack([np.cos(t), np.sin(t)], axis=1)
+    uv = np.concatenate([[[0, 0], [1, 0], [1, 1], [0, 1.0]], hole])
+    base = rectangle([0, 0, 0], [2, 0, 0], [0, 2, 0])
+    S = np.column_stack([2 * uv, np.zeros(len(uv))])
+    sizes = np.concatenate([np.full(4, np.inf), np.full(200, 1e-4)])
+    sizes[4::20] = 0.1  # ten of them matter
+    trim = TrimmedSurface(base, np.array([0.0, 1, 0, 1]), uv, np.array([0, 4, 204]), S, sizes)
+    decagon = 10 / 2 * 0.5**2 * np.sin(2 * np.pi / 10)
+    assert areas(trim).sum(axis=0) == pytest.approx([0, 0, 4 - decagon])
