@@ -53,7 +53,7 @@ class WholePieces:
         over = np.flatnonzero([q.distance for q in patches] > FAR_OFF * tolerance)
         for s in over:
             own = (self.surfaces[s], self.known.is_closed[s], self.known.is_collapsed[s])
-            demands[s], _ = _amended(demands[s], *own, placed[s], patches[s].distance, tolerance[s], 0)
+            demands[s], _ = amended(demands[s], *own, placed[s], patches[s].distance, tolerance[s], 0)
         return self._with(demands) if over.size else None
 
     def _with(self, demands):
@@ -62,7 +62,7 @@ class WholePieces:
     def cut_within(self, tolerance, slide):
         """A list of Patch: cut until the measured distance stays within tolerance (n,).
 
-        Where it does not, a little more is asked for and the plan is amended (`_amended`).  Gives up after ROUNDS;
+        Where it does not, a little more is asked for and the plan is amended (`amended`).  Gives up after ROUNDS;
         the patches say what was reached.
         """
         pieces, ask, patches, before = self, tolerance.copy(), [None] * len(self.surfaces), None
@@ -79,7 +79,7 @@ class WholePieces:
             demands = list(pieces.plan.demands)
             for s in over:
                 own = (self.surfaces[s], self.known.is_closed[s], self.known.is_collapsed[s])
-                demands[s], share = _amended(demands[s], *own, placed[s], distance[s], tolerance[s], attempt)
+                demands[s], share = amended(demands[s], *own, placed[s], distance[s], tolerance[s], attempt)
                 ask[s] *= share
             pieces = self._with(demands)
         return patches
@@ -99,7 +99,7 @@ def _plan(surfaces, known, lattice):
     return find_lines.plan(demands, find_lines.links(len(surfaces), known.borders))
 
 
-def _amended(demand, surface, is_closed, is_collapsed, placed, distance, tolerance, attempt):
+def amended(demand, surface, is_closed, is_collapsed, placed, distance, tolerance, attempt):
     """A Demand that fails with the lines `placed` (u, v), amended, and the share of the tolerance to ask for next.
 
     Chords that fail show where: there the surface is measured finer.  If that did not help, few failing ones are

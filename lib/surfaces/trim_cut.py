@@ -1,12 +1,16 @@
 """Trimmed surfaces cut into triangles together, so that all faces along an edge keep the same points of it."""
 
+from copy import copy
+
 import numpy as np
 
 from lib.nurbs import lines as find_lines
+from lib.nurbs.cut import amended
 from lib.nurbs.evaluate import normal
 from lib.surfaces.trim_border import borders
 from lib.surfaces.trim_mesh import ROUNDS, Lines, Unfit, scales, triangulate
 
+LESSONS = 3  # times lines are placed anew where they miss the tolerance by far
 PATIENCE = 12  # times an edge's tolerance is lowered: to 2e-4 of the first or less
 ROUGH_ROUNDS, FAR_OFF = 1, 1.3  # of putting points inside, where a count is asked for; where the distance is so large
 
@@ -18,7 +22,7 @@ class TrimmedPieces:
     """
 
     def __init__(self, surfaces, known, lattice=None):
-        self.surfaces, self.extent = surfaces, known.extent
+        self.surfaces, self.known = surfaces, known
         each = zip(surfaces, known.is_closed, known.is_collapsed, strict=True)
         demands = [find_lines.demand(s.base, c, p) for s, c, p in each]
         for s, along in (lattice or {}).items():
@@ -49,51 +53,82 @@ class TrimmedPieces:
         for s, (u, v) in enumerate(placed):
             d = self.plan.demands[s]
             kinks = tuple(np.union1d(k, f) for k, f in zip(d.kinks, d.forced, strict=True))
-            out.append(Lines(u, v, kinks, scales(len(u) - 1, len(v) - 1, self.extent[s])))
+            out.append(Lines(u, v, kinks, scales(len(u) - 1, len(v) - 1, self.known.extent[s])))
         return out
 
     def cut(self, tolerance, slide):
         """A list of Patch for tolerance (n,) and slide (n,), cut once, with a correction where that is far off."""
-        return self._cut(tolerance, slide, FAR_OFF, ROUGH_ROUNDS)
+        job = _Job(self, FAR_OFF * tolerance)
+        return job.cut(self._lines(tolerance, slide), ROUGH_ROUNDS)
 
     def cut_within(self, tolerance, slide):
-        """A list of Patch within tolerance (n,); what is reached is in the patches."""
-        return self._cut(tolerance, slide, 1.0, ROUNDS)
+        """A list of Patch within tolerance (n,); what is reached is in the patches.
 
-    def _cut(self, tolerance, slide, factor, rounds):
-        lines = self._lines(tolerance, slide)
-        # Find border points that do, by the first triangles; then put points inside
-        at_place, _ = self._attempt(self.borders.tolerances(tolerance), lines, factor * tolerance, 0)
-        return self._attempt(at_place, lines, factor * tolerance, rounds)[1]
-
-    def _attempt(self, at_place, lines, tolerance, rounds):
-        """Tolerances of positions (places,) at which all surfaces can be cut, and their patches."""
-        patches, kept = [None] * len(self.surfaces), [None] * len(self.surfaces)
-        for attempt in range(PATIENCE + 1):
-            keep, unfit = self.borders.kept(at_place), []
-            for s, surface in enumerate(self.surfaces):
-                first, end = self.borders.start[s : s + 2]
-                own = keep[first:end]
-                if kept[s] is not None and np.array_equal(own, kept[s]):
-                    continue
-                is_last = own.all() or attempt == PATIENCE
-                try:
-                    patches[s] = triangulate(surface, own, lines[s], tolerance[s], rounds, is_last)
-                    kept[s] = own
-                except Unfit as error:
-                    unfit.append((self.borders.edge[first + error.points], error.share))
-            if not unfit:
+        First border points and lines that do are found, by triangles between them alone; then points are put inside
+        where that is not enough.
+        """
+        pieces, job = self, _Job(self, tolerance)
+        for _ in range(LESSONS):
+            patches = job.cut(pieces._lines(tolerance, slide), 0)
+            better = pieces.learned(patches, tolerance, slide)
+            if better is None:
                 break
-            at_place = self.borders.lowered(at_place, unfit)
-        return at_place, patches
+            job.forget([p.distance > FAR_OFF * t for p, t in zip(patches, tolerance, strict=True)])
+            pieces = better
+        job.forget([p is None or p.distance > t for p, t in zip(job.patches, tolerance, strict=True)])
+        return job.cut(pieces._lines(tolerance, slide), ROUNDS)
 
     def learned(self, patches, tolerance, slide):
-        """None: cutting already puts right what is far off."""
-        return None
+        """The pieces measured finer where `patches` miss tolerance (n,) by far; None if nowhere."""
+        over = np.flatnonzero([q.distance > FAR_OFF * t for q, t in zip(patches, tolerance, strict=True)])
+        demands, lines = list(self.plan.demands), self._lines(tolerance, slide)
+        for s in over:
+            own = (self.surfaces[s].base, self.known.is_closed[s], self.known.is_collapsed[s])
+            placed = (lines[s].u, lines[s].v)
+            demands[s], _ = amended(demands[s], *own, placed, patches[s].distance, tolerance[s], 0)
+        if all(new is old for new, old in zip(demands, self.plan.demands, strict=True)):
+            return None
+        out = copy(self)
+        out.plan = find_lines.plan(demands, self.plan.links)
+        return out
 
     def normals(self, s, patch):
         """Unit normals (k, 3) of the exact surface s at a patch's vertices."""
         return normal(self.surfaces[s].base, patch.UV[:, 0], patch.UV[:, 1])
+
+
+class _Job:
+    """Patches of all surfaces of some TrimmedPieces for tolerance (n,), their border points agreed on."""
+
+    def __init__(self, pieces, tolerance):
+        self.pieces, self.tolerance = pieces, tolerance
+        self.at_place = pieces.borders.tolerances(tolerance)
+        self.patches, self._kept = [None] * len(tolerance), [None] * len(tolerance)
+
+    def forget(self, which):
+        """Surfaces `which` (n,) bool are to be cut again."""
+        self._kept = [None if again else kept for again, kept in zip(which, self._kept, strict=True)]
+
+    def cut(self, lines, rounds):
+        """The patches along `lines`, points put inside so many rounds; edges that do not do get more points."""
+        borders = self.pieces.borders
+        for attempt in range(PATIENCE + 1):
+            keep, unfit = borders.kept(self.at_place), []
+            for s, surface in enumerate(self.pieces.surfaces):
+                first, end = borders.start[s : s + 2]
+                own = keep[first:end]
+                if self._kept[s] is not None and np.array_equal(own, self._kept[s]):
+                    continue
+                is_last = own.all() or attempt == PATIENCE
+                try:
+                    self.patches[s] = triangulate(surface, own, lines[s], self.tolerance[s], rounds, is_last)
+                    self._kept[s] = own
+                except Unfit as error:
+                    unfit.append((borders.edge[first + error.points], error.share))
+            if not unfit:
+                break
+            self.at_place = borders.lowered(self.at_place, unfit)
+        return list(self.patches)
 
 
 def _shoelace(uv, loop_start):

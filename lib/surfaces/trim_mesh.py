@@ -18,7 +18,7 @@ from lib.surfaces.loops import following, inside_loops
 from lib.surfaces.trim_distance import distances
 from lib.surfaces.trim_flat import without_flat
 from lib.surfaces.trim_flip import flipped
-from lib.surfaces.trim_nodes import creases, nodes
+from lib.surfaces.trim_nodes import Grid, creases
 from lib.surfaces.trimmed import TrimmedSurface
 
 NOT_ALLOWED = pythoncdt.IntersectingConstraintEdges.NOT_ALLOWED
@@ -145,11 +145,12 @@ def triangulate(trim, keep, lines, tolerance, rounds=ROUNDS, is_last=False):
     border, uv, S, edges = _with_poles(trim, border, after, lines)
     if not is_last:
         _check_areas(trim, border, uv, edges)
-    uv = np.concatenate([uv, nodes(uv[edges[:, 0]], uv[edges[:, 1]], lines.u, lines.v)])
+    grid = Grid(uv[edges[:, 0]], uv[edges[:, 1]], lines.u, lines.v)
+    uv = np.concatenate([uv, grid.uv])
     off = np.linalg.norm(evaluate(trim.base, *np.clip(uv[: len(S)], 0, 1).T)[0] - S, axis=1)  # by the file's tolerance
     found, least, better = None, np.inf, 0
     for turn in range(rounds + 1):
-        F, uv, fixed = _triangles(trim, border, uv, edges, lines, is_last)
+        F, uv, fixed = _triangles(border, uv, edges, lines, grid, is_last)
         S = np.concatenate([S, evaluate(trim.base, *np.clip(uv[len(S) :], 0, 1).T)[0]])
         found, F = distances(trim.base, S, uv, without_flat(S, F, edges), found)
         if (found.height > tolerance).any():
@@ -167,7 +168,9 @@ def triangulate(trim, keep, lines, tolerance, rounds=ROUNDS, is_last=False):
         better, least = (turn, excess) if excess < LESS * least else (better, least)
         if not failing.any() or turn == rounds or turn - better == PATIENCE:
             break
-        uv = np.concatenate([uv, _between(uv, F[failing], np.where(is_border, -1.0, found.on_edge)[failing])])
+        new = _between(uv, F[failing], np.where(is_border, -1.0, found.on_edge)[failing])
+        grid.dissolve(new)
+        uv = np.concatenate([uv, new])
     return _patch(trim, keep, border, S, uv, F, found)
 
 
@@ -236,21 +239,28 @@ def _signed(A, B):
     return A[:, 0] * B[:, 1] - A[:, 1] * B[:, 0]
 
 
-def _triangles(trim, border, uv, edges, lines, is_last):
+def _triangles(border, uv, edges, lines, grid, is_last):
     """Triangles (m, 3) of the points, the points, more of them where loops cross and this is the last resort, and the
-    edges (e, 2) that must stay.
+    edges (e, 2) that must stay.  Whole cells are cut in two, the rest between them and the border is Delaunay.
     """
     more = creases(uv, uv[edges[:, 0]], uv[edges[:, 1]], lines.kinks)
+    cells, outline, is_inner = grid.cells()
+    first = len(border)
+    rest = np.ones(len(uv), dtype=bool)
+    rest[first : first + len(is_inner)] = ~is_inner
+    own = np.cumsum(rest) - 1
+    x, loops = (uv * lines.scale)[rest], own[np.concatenate([edges, outline + first])]
     try:
-        F = _inside(uv * lines.scale, edges, more)
+        F = _inside(x, loops, own[more[rest[more].all(axis=1)]])
     except RuntimeError:
-        own = crossing(uv[edges[:, 0]], uv[edges[:, 1]])
-        if own.size and not is_last:
-            raise Unfit(_real(border, edges[own].ravel())) from None
+        crossed = crossing(uv[edges[:, 0]], uv[edges[:, 1]])
+        if crossed.size and not is_last:
+            raise Unfit(_real(border, edges[crossed].ravel())) from None
         if is_last:
             points, F = _crossed(uv * lines.scale, edges)
             return F, np.concatenate([uv, (points / lines.scale)[len(uv) :]]), edges
-        F = _inside(uv * lines.scale, edges, more[:0])
+        F = _inside(x, loops, more[:0])
+    F = np.concatenate([np.flatnonzero(rest)[F], cells + first])
     A, B, C = (uv[F[:, k]] for k in range(3))
     found, expected = _signed2(A, B, C).sum(), _signed(uv[edges[:, 0]], uv[edges[:, 1]]).sum()
     if abs(found - expected) > 1e-6 * abs(expected) and not is_last:  # a hole that came to lie outside

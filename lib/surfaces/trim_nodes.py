@@ -1,4 +1,5 @@
-"""Interior vertices of a trimmed surface: crossings of its lines that lie inside the loops and not near them.
+"""Interior vertices of a trimmed surface: crossings of its lines that lie inside the loops and not near them, and the
+cells between four of them.
 
 Everything is counted along the lines, so that the cost is that of the border and the crossings, not their product.
 """
@@ -10,14 +11,53 @@ SAMPLES = 4  # of the border in each step between lines
 ON_LINE = 1e-9  # border points this near to a kink lie on it
 
 
-def nodes(A, B, u, v):
-    """Crossings (k, 2) of the lines u, v (ascending, 0 and 1 among them) inside the segments A-B (e, 2) of loops."""
-    U, V = u[1:-1], v[1:-1]
-    if not (U.size and V.size):
-        return np.empty((0, 2))
-    is_free = _inside(A, B, U, V) & (_nearness(A, B, u, v)[1:-1, 1:-1] >= NEAR)
-    j, i = np.nonzero(is_free)
-    return np.stack([U[i], V[j]], axis=1)
+class Grid:
+    """Crossings of lines u, v (ascending, 0 and 1 among them) inside the segments A-B (e, 2) of loops.
+
+    uv : (k, 2) the crossings;  number : (len(v), len(u)) int, which of them, -1 where there is none
+    is_whole : (len(v) - 1, len(u) - 1) bool, cells between four of them that no border runs through
+    """
+
+    def __init__(self, A, B, u, v):
+        self.u, self.v = u, v
+        near, is_crossed = _nearness(A, B, u, v)
+        is_free = np.zeros((v.size, u.size), dtype=bool)
+        is_free[1:-1, 1:-1] = _inside(A, B, u[1:-1], v[1:-1]) & (near[1:-1, 1:-1] >= NEAR)
+        j, i = np.nonzero(is_free)
+        self.uv = np.stack([u[i], v[j]], axis=1)
+        self.number = np.full(is_free.shape, -1)
+        self.number[j, i] = np.arange(len(i))
+        self.is_whole = is_free[:-1, :-1] & is_free[:-1, 1:] & is_free[1:, :-1] & is_free[1:, 1:] & ~is_crossed
+
+    def dissolve(self, uv):
+        """The cells with the points uv (n, 2) inside or on their border are whole no more."""
+        for side_u in ("left", "right"):
+            for side_v in ("left", "right"):
+                i = np.clip(np.searchsorted(self.u, uv[:, 0], side=side_u) - 1, 0, self.u.size - 2)
+                j = np.clip(np.searchsorted(self.v, uv[:, 1], side=side_v) - 1, 0, self.v.size - 2)
+                self.is_whole[j, i] = False
+
+    def cells(self):
+        """Of the whole cells: triangles (m, 3) of the crossings, the edges (e, 2) around them all, and (k,) bool the
+        crossings that lie inside.
+        """
+        n, w = self.number, self.is_whole
+        corner = [x[w] for x in (n[:-1, :-1], n[:-1, 1:], n[1:, 1:], n[1:, :-1])]
+        F = np.concatenate([np.stack([corner[0], corner[k], corner[k + 1]], axis=1) for k in (1, 2)])
+        around = np.pad(w, 1)
+        across_v = around[1:, 1:-1] != around[:-1, 1:-1]  # an edge along u between two cells
+        across_u = around[1:-1, 1:] != around[1:-1, :-1]
+        edges = np.concatenate(
+            [
+                np.stack([n[:, :-1][across_v], n[:, 1:][across_v]], axis=1),
+                np.stack([n[:-1][across_u], n[1:][across_u]], axis=1),
+            ]
+        )
+        inner = np.zeros(n.shape, dtype=bool)
+        inner[1:-1, 1:-1] = w[:-1, :-1] & w[:-1, 1:] & w[1:, :-1] & w[1:, 1:]
+        is_inner = np.zeros(len(self.uv), dtype=bool)
+        is_inner[n[inner]] = True
+        return F, edges, is_inner
 
 
 def _inside(A, B, U, V):
@@ -42,7 +82,9 @@ def crossings(A, B, lines):
 
 
 def _nearness(A, B, u, v):
-    """(len(v), len(u)) distance of each crossing from the segments, in steps between lines; inf beyond one step."""
+    """Distance (len(v), len(u)) of each crossing from the segments, in steps between lines, inf beyond one step; and
+    (len(v) - 1, len(u) - 1) bool, the cells they run through.
+    """
     out = np.full((v.size, u.size), np.inf)
     columns, rows = np.arange(u.size), np.arange(v.size)
     step = [np.abs(np.interp(B[:, d], t, n) - np.interp(A[:, d], t, n)) for d, t, n in ((0, u, columns), (1, v, rows))]
@@ -55,7 +97,9 @@ def _nearness(A, B, u, v):
     for di in (0, 1):
         for dj in (0, 1):
             np.minimum.at(out, (j + dj, i + di), np.hypot(x - i - di, y - j - dj))
-    return out
+    is_crossed = np.zeros((v.size - 1, u.size - 1), dtype=bool)
+    is_crossed[j, i] = True
+    return out, is_crossed
 
 
 def creases(uv, A, B, kinks):
