@@ -1,8 +1,7 @@
 """Triangles as a file lists them, made a Mesh: positions welded, useless triangles dropped, a normal at every corner.
 
 A file's normal counts where it lies within 90 degrees of its triangle's.  Elsewhere normals are those of the triangles
-around the position, weighted by the angle there (Thuermer and Wuethrich 1998), as far as one gets across edges that are
-folded by less than CREASE.
+around the position, weighted by their angle there, as far as one gets across edges that are folded by less than CREASE.
 """
 
 from dataclasses import dataclass
