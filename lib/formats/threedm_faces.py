@@ -15,7 +15,7 @@ from lib.nurbs.curve import NurbsCurve, polyline
 from lib.nurbs.evaluate import point
 from lib.nurbs.invert import Inverter
 from lib.nurbs.surface import NurbsSurface
-from lib.surfaces.trim_build import EdgeUse, significance, trimmed
+from lib.surfaces.trim_build import EdgeUse, signed_area, significance, trimmed
 
 CURVED = 9  # least points of an edge: straight in space may be bent in u, v
 ON_SIDE = 1e-5  # of the surface's size: an edge that stays so near a side lies on it
@@ -85,9 +85,10 @@ class _Face:
 
     def __init__(self, surface, face, edge, vertex):
         self.inverter = Inverter(surface)
-        self.trims = []
+        self.trims, self.is_outer = [], []
         for number in range(len(face.Loops)):
             loop = face.Loops[number]
+            self.is_outer.append(loop.LoopType.name == "Outer")
             self.trims.append([_trim(loop.Trims[k], edge, vertex) for k in range(loop.TrimCount)])
         used = [trim.edge for loop in self.trims for trim in loop if trim.edge is not None]
         self.twice = {edge for edge in used if used.count(edge) > 1}
@@ -105,6 +106,8 @@ class _Face:
                     trim.uv = self._along_pole(before.uv[-1], after.uv[0])
                     trim.S = np.repeat(trim.S, len(trim.uv), axis=0)
                     trim.significance = np.full(len(trim.uv), np.inf)
+            if (signed_area(np.concatenate([trim.uv for trim in loop])) > 0) != self.is_outer[number - 1]:
+                raise ValueError(f"loop {number}: runs the wrong way around in u, v; its edges were not found there")
             result.append([EdgeUse(trim.uv, trim.S, trim.significance) for trim in loop])
         return result
 

@@ -127,7 +127,8 @@ class Inverter:
         uv, distance = uv.copy(), distance.copy()
         for _ in range(MOST_ROUNDS if len(line) > 1 else 0):
             off = self._stray(line, uv)
-            bad = np.flatnonzero(off > JUMP * self.size)
+            beside = 4 * np.median(distance)  # an edge that runs beside the surface strays by as much
+            bad = np.flatnonzero(off > JUMP * self.size + beside)
             if not bad.size:
                 break
             # Either end of a stray step may be the wrong one: move the one that loses less by it
