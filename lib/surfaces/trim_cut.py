@@ -8,7 +8,7 @@ from lib.nurbs import lines as find_lines
 from lib.nurbs.cut import amended
 from lib.nurbs.evaluate import normal
 from lib.surfaces.trim_border import borders
-from lib.surfaces.trim_mesh import ROUNDS, Lines, Unfit, scales, triangulate
+from lib.surfaces.trim_mesh import ROUNDS, Lines, Unfit, triangulate
 
 LESSONS = 3  # times lines are placed anew where they miss the tolerance by far
 PATIENCE = 12  # times an edge's tolerance is lowered: to 2e-4 of the first or less
@@ -53,7 +53,7 @@ class TrimmedPieces:
         for s, (u, v) in enumerate(placed):
             d = self.plan.demands[s]
             kinks = tuple(np.union1d(k, f) for k, f in zip(d.kinks, d.forced, strict=True))
-            out.append(Lines(u, v, kinks, scales(len(u) - 1, len(v) - 1, self.known.extent[s])))
+            out.append(Lines(u, v, kinks, self.known.extent[s]))
         return out
 
     def cut(self, tolerance, slide):

@@ -27,6 +27,7 @@ LEAST_SHARE = 0.3  # of its area that a loop keeps
 ROUNDS = 20  # of measuring and putting points where a triangle is too far off
 BESIDE = 1.2  # of the distance at its border edges that a triangle may have inside
 PATIENCE, LESS = 4, 0.9  # rounds in which the area too far off must fall to so much of the least so far
+SAME_AREA = 1e-9  # share by which the triangles' area may differ from that of the loops
 NOTHING = 1e-14  # of the whole: a region smaller than this is rounding's
 AT_ONCE = 1_000_000  # pairs of edges compared
 
@@ -44,19 +45,26 @@ class Unfit(ValueError):
 
 @dataclass(frozen=True)
 class Lines:
-    """Lines u, v (ascending, 0 and 1 among them) whose crossings are vertices, those of them along kinks, and the
-    factors (2,) that make a step as long as another.
+    """Lines u, v (ascending, 0 and 1 among them) whose crossings are vertices, those of them along kinks, and the mean
+    lengths (2,) of the surface along u and v.
     """
 
     u: np.ndarray
     v: np.ndarray
     kinks: tuple
-    scale: np.ndarray
+    extent: np.ndarray
 
+    def planes(self, uv):
+        """The points uv (k, 2) laid out for Delaunay, (k, 2) each: by the lines between them, then by their mean.
 
-def scales(n_u, n_v, extent):
-    """Factors (2,) of u and v: steps where the surface is curved, lengths where it is straight both ways."""
-    return np.maximum(np.array([n_u, n_v]) - 1.0, 0.0) + np.asarray(extent) / max(extent)
+        A step between lines counts as 1, where the surface is straight its length counts.  The first way suits lines
+        that crowd, but bends straight borders.
+        """
+        rest = np.asarray(self.extent) / max(self.extent)
+        n = np.array([len(self.u), len(self.v)]) - 2.0
+        steps = [np.interp(x, t, np.linspace(0.0, 1.0, len(t))) for x, t in zip(uv.T, (self.u, self.v), strict=True)]
+        yield n * np.stack(steps, axis=1) + rest * uv
+        yield (n + rest) * uv
 
 
 def domain_triangles(trim: TrimmedSurface):
@@ -249,23 +257,25 @@ def _triangles(border, uv, edges, lines, grid, is_last):
     rest = np.ones(len(uv), dtype=bool)
     rest[first : first + len(is_inner)] = ~is_inner
     own = np.cumsum(rest) - 1
-    x, loops = (uv * lines.scale)[rest], own[np.concatenate([edges, outline + first])]
-    try:
-        F = _inside(x, loops, own[more[rest[more].all(axis=1)]])
-    except RuntimeError:
+    loops = own[np.concatenate([edges, outline + first])]
+    inner = own[more[rest[more].all(axis=1)]]
+    expected = _signed(uv[edges[:, 0]], uv[edges[:, 1]]).sum()
+    for plane in lines.planes(uv):
+        for constraints in (inner, inner[:0]):
+            try:
+                F = _inside(plane[rest], loops, constraints)
+            except RuntimeError:
+                continue
+            F = np.concatenate([np.flatnonzero(rest)[F], cells + first])
+            area = _signed2(*(uv[F[:, k]] for k in range(3)))
+            if abs(area.sum() - expected) <= SAME_AREA * abs(expected) and area.min() >= -NOTHING * abs(expected):
+                return F, uv, np.concatenate([edges, more])
+    if not is_last:
         crossed = crossing(uv[edges[:, 0]], uv[edges[:, 1]])
-        if crossed.size and not is_last:
-            raise Unfit(_real(border, edges[crossed].ravel())) from None
-        if is_last:
-            points, F = _crossed(uv * lines.scale, edges)
-            return F, np.concatenate([uv, (points / lines.scale)[len(uv) :]]), edges
-        F = _inside(x, loops, more[:0])
-    F = np.concatenate([np.flatnonzero(rest)[F], cells + first])
-    A, B, C = (uv[F[:, k]] for k in range(3))
-    found, expected = _signed2(A, B, C).sum(), _signed(uv[edges[:, 0]], uv[edges[:, 1]]).sum()
-    if abs(found - expected) > 1e-6 * abs(expected) and not is_last:  # a hole that came to lie outside
-        raise Unfit(_real(border, np.arange(len(border))))
-    return F, uv, np.concatenate([edges, more])
+        rows = edges[crossed].ravel() if crossed.size else np.arange(len(border))  # or a hole came to lie outside
+        raise Unfit(_real(border, rows))
+    points, F = _crossed(uv, edges)
+    return F, np.concatenate([uv, points[len(uv) :]]), edges
 
 
 def _signed2(A, B, C):
