@@ -22,7 +22,9 @@ README = (ROOT / "README.md").read_text(encoding="utf-8")
 REQUIRED = [Requirement(text) for text in PROJECT["dependencies"]]
 EXTRAS = {name: [Requirement(text) for text in texts] for name, texts in PROJECT["optional-dependencies"].items()}
 PINS = {canonicalize_name(name): version for name, version in re.findall(r"^([\w.-]+)==(\S+)", LOCK, re.MULTILINE)}
-IMPORT_NAMES = {"open3d-cpu": "open3d", "pyyaml": "yaml", "openimageio": "OpenImageIO"}  # others: - is _
+IMPORT_NAMES = {  # others: - is _
+    "open3d-cpu": "open3d", "pyyaml": "yaml", "openimageio": "OpenImageIO", "cadquery-ocp-novtk": "OCP",
+}  # fmt: skip
 COMMANDS = {"snakemake", "pytest"}  # run rather than imported
 NOT_YET = {"fast-simplification", "xatlas", "pythoncdt"}  # for meshes; the README says so
 

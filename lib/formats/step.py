@@ -165,7 +165,8 @@ class _Patches:
             self.report.add(what + known, field="trimmed" if left_out else "only")
         notes = [f"skipped: {', '.join(self.faces.notes)}"] if self.faces.notes else []
         if far:
-            notes.append(f"edges lie off their surface in {len(far)} faces, up to {max(far)[0]:.1e} of the face's size")
+            worst, number = max(far)
+            notes.append(f"edges lie off their surface in faces: {len(far)}, most in {number}: {worst:.1e} of its size")
         used = dict.fromkeys(patch.material for patch in patches if patch.material)
         colours = dict(zip(reversed(self.colours), reversed(self.faces.colours.tolist()), strict=True))
         materials = {name: {"reflectance": colours[name]} for name in used}
@@ -182,9 +183,7 @@ class _Patches:
         kind = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", self.faces.kinds[face]).lower()
         if str(face) in self.faces.failed:
             why = self.faces.failed[str(face)]
-            self.report.add(
-                f"the face, a {kind}, can not be converted ({why}); `only` selects names and colours", number
-            )
+            self.report.add(f"a {kind} that can not be converted ({why}); `only` selects names and colours", number)
             return None
         if self.faces.gap[face] > GAP_REFUSED:
             gap = f"{self.faces.gap[face]:.2g}"

@@ -59,11 +59,11 @@ def to_unit(t, knots, how, period=None):
 
     period : of the file's parameter where the surface goes all the way round; whole turns become whole numbers
 
-    >>> knots = np.array([0.0, np.pi / 2, np.pi])
-    >>> to_unit(np.array([0.0, np.pi / 4, np.pi / 2, np.pi]), knots, "arc").round(12).tolist()
-    [0.0, 0.25, 0.5, 1.0]
-    >>> to_unit(np.array([np.pi / 6, np.pi + 7]), knots, "arc", 2 * np.pi).round(3).tolist()
-    [0.177, 1.113]
+    >>> to_unit(np.pi * np.array([0, 1 / 6, 1 / 4, 1]), np.pi * np.array([0, 1 / 2, 1]), "arc").round(3).tolist()
+    [0.0, 0.171, 0.25, 1.0]
+    >>> thirds = np.linspace(0.0, 2 * np.pi, 4)
+    >>> to_unit(thirds - np.pi, thirds, "arc", 2 * np.pi).round(3).tolist()
+    [-0.5, -0.167, 0.167, 0.5]
     """
     t, turns = np.asarray(t, dtype=np.float64), 0.0
     if period is not None:

@@ -98,12 +98,11 @@ def packed(shapes, colours, instances, notes):
     edges = [S for _, _, those in shapes for S in those]
     first_edge = np.repeat(_first([len(those) for *_, those in shapes])[:-1], [_uses(those) for _, those, _ in shapes])
     first_body = _first([max((face.body + 1 for face in those), default=0) for _, those, _ in shapes])
+    counts = [len(those) for _, those, _ in shapes]
     knots = [a for s in made if s for a in (s.knots_u, s.knots_v)]
     return StepFaces(
-        face_first=_first([len(those) for _, those, _ in shapes]),
-        body=np.array(
-            [first + f.body for first, (_, those, _) in zip(first_body, shapes, strict=False) for f in those]
-        ),
+        face_first=_first(counts),
+        body=np.array([face.body for face in faces], dtype=np.int64) + np.repeat(first_body[:-1], counts),
         is_solid=np.array([face.is_solid for face in faces], dtype=bool),
         is_trimmed=np.array([face.is_trimmed for face in faces], dtype=bool),
         is_reversed=np.array([face.is_reversed for face in faces], dtype=bool),
@@ -140,6 +139,8 @@ def _uses(faces):
     return sum(len(loop) for face in faces for loop in face.loops)
 
 
+FLAGS = ("is_solid", "is_trimmed", "is_reversed", "is_backward")
+NUMBERS = ("body", "colour", "degree", "count", "edge")
 WORDS = ("shapes", "kinds", "instances", "failed", "notes")
 ARRAYS = [item.name for item in fields(StepFaces) if item.name not in WORDS]
 
@@ -152,18 +153,22 @@ def check(x):
         a = getattr(x, name)
         _hold(a.ndim == 1 and a.dtype.kind in "iu" and len(a) > 0, name, "no list of whole numbers")
         _hold(a[0] == 0 and (np.diff(a) >= 0).all() and a[-1] == ends[name], name, "does not count what there is")
-    for name in ("body", "is_solid", "is_trimmed", "is_reversed", "colour", "gap", "degree", "count", "kinds"):
-        _hold(len(getattr(x, name)) == f <= MAX_FACES, name, "not one for each face")
+    for name in FLAGS + NUMBERS:
+        _hold(getattr(x, name).dtype.kind in ("b" if name in FLAGS else "iu"), name, "of another type")
+    for name in (*FLAGS[:3], "body", "colour", "gap"):
+        _hold(getattr(x, name).shape == (f,), name, "not one for each face")
+    _hold(f <= MAX_FACES and (x.body >= 0).all() and (x.body < max(f, 1)).all(), "body", "no such body")
     for name in ("pole_first", "knot_first", "loop_first"):
         _hold(len(getattr(x, name)) == f + 1, name, "not one for each face")
     for name, columns in (("colours", 3), ("degree", 2), ("count", 2), ("Pw", 4), ("uv", 2), ("S", 3)):
         a = getattr(x, name)
         _hold(a.ndim == 2 and a.shape[1] == columns and np.isfinite(a).all(), name, f"not finite rows of {columns}")
+    _hold(len(x.degree) == len(x.count) == len(x.kinds) == f, "kinds", "not one for each face")
     for name in ("gap", "knots"):
-        _hold(np.isfinite(getattr(x, name)).all(), name, "NaN or Inf")
+        _hold(getattr(x, name).ndim == 1 and np.isfinite(getattr(x, name)).all(), name, "NaN or Inf")
     _hold(((x.colours >= 0) & (x.colours <= 1)).all(), "colours", "outside [0, 1]")
     _hold(((x.colour >= -1) & (x.colour < len(x.colours))).all(), "colour", "no such colour")
-    _hold(len(x.is_backward) == len(x.edge) == len(x.uv_first) - 1, "uv_first", "not one for each use")
+    _hold(x.is_backward.shape == x.edge.shape == (len(x.uv_first) - 1,), "uv_first", "not one for each use")
     _hold(((x.edge >= 0) & (x.edge < len(x.edge_first) - 1)).all(), "edge", "no such edge")
     _hold((np.diff(x.uv_first) == np.diff(x.edge_first)[x.edge]).all(), "uv", "not one for each point of the edge")
     (p, q), (n, m) = x.degree.T, x.count.T
@@ -177,6 +182,13 @@ def check(x):
         _hold(-1 <= instance["colour"] < len(x.colours), "instances", "no such colour")
         matrix = np.asarray(instance["matrix"], dtype=np.float64)
         _hold(matrix.shape == (12,) and np.isfinite(matrix).all(), "instances", "no finite matrix")
+        _hold(_are_texts(instance["labels"]), "instances", "labels that are no texts")
+    for name in ("shapes", "kinds", "notes"):
+        _hold(_are_texts(getattr(x, name)), name, "no list of texts")
+
+
+def _are_texts(found):
+    return isinstance(found, list) and all(isinstance(text, str) for text in found)
 
 
 def _hold(is_so, name, what):
