@@ -1,4 +1,4 @@
-"""Which of a scene's open sheets get light on both sides."""
+"""Which of a scene's open sheets get light on both sides, and which on the other side than their file says."""
 
 import numpy as np
 
@@ -11,8 +11,9 @@ from lib.visibility.both_sides import is_two_sided, side_light
 CLOSED = 0.9  # share of a surface's triangles in closed shells from which it is no open sheet
 
 
-def lit_on_both_sides(placed, table, asked):
-    """Those of the surfaces `asked` (indices into placed, a list of Placed) that have light on both sides.
+def lit_sides(placed, table, asked):
+    """Of the surfaces `asked` (indices into placed, a list of Placed): those that have light on both sides, and those
+    that have it on their back alone.
 
     table : rows of scene_table
     """
@@ -31,10 +32,11 @@ def lit_on_both_sides(placed, table, asked):
     )
     asked = [k for k in asked if not (is_mesh[k] and shut[k] >= CLOSED)]
     if not asked:
-        return []
+        return [], []
     low, high = V.min(axis=0), V.max(axis=0)
     V = (V - (low + high) / 2) / max(float((high - low).max()), 1e-300)
     E = np.array([table[one.name]["E"] for one in placed], dtype=np.float64)
     rho = np.where([table[one.name]["is_black"] for one in placed], 0.0, REFLECTANCE)
     light = side_light(V, F, surface, E, rho, np.array(asked))
-    return [k for k in asked if is_two_sided(light)[k]]
+    both = is_two_sided(light)
+    return [k for k in asked if both[k]], [k for k in asked if not both[k] and light[k, 1] > light[k, 0]]

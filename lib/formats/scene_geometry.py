@@ -142,7 +142,7 @@ def load(entries, units, folder, file, where=None, up="z"):
 def _read(entry, folder, file):
     shown = str(Path(file).parent / entry["file"])
     name, only, trimmed = entry_name(entry), entry.get("only"), entry.get("trimmed", TRIMMED)
-    return geometry_file.read(Path(folder) / entry["file"], shown, name, only, trimmed)
+    return geometry_file.read(Path(folder) / entry["file"], shown, name, only, trimmed, root=Path(folder))
 
 
 def inline(entry):

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lib.formats import scene_folder, scene_geometry, scene_import, scene_rules, scene_table
+from lib.formats.mistakes import listed
 from lib.formats.quantities import METRES
 from lib.surfaces.measure import points
 
@@ -52,8 +53,13 @@ def read(folder, overrides=None):
         settings.setdefault("camera", before(placed, settings["units"], settings["up"]))
         placed = placed + [replace(one, entry=index) for one in load([entry]).placed]
     table = scene_table.resolve(settings, placed, where, strict=False)
-    backs = with_backs(placed, both_sides(placed, table))
+    both, turned = both_sides(placed, table)
+    backs = with_backs(placed, both)
     table = scene_table.resolve(settings, backs, where)
+    for name in turned:
+        table[name]["turn"] = not table[name]["turn"]
+    if turned:
+        notes = [*notes, f"open sheets turned towards the light: {listed(sorted(turned))}"]
     made = scene_import.assemble(backs, notes, table, settings["up"])
     return Model(source, settings, backs, table, made, pictures)
 
@@ -86,14 +92,18 @@ def before(placed, units, up):
 
 
 def both_sides(placed, table):
-    """Names of the surfaces that are lit on both sides: those said to be, and open sheets where it turns out so."""
+    """Names of the surfaces that are lit on both sides, and of those that are lit on their back alone.
+
+    Both: those said to be, and open sheets where it turns out so.  The side an open sheet faces says little in a file.
+    """
     said = {one.name for one in placed if table[one.name]["two_sided"] is True}
     asked = [k for k, one in enumerate(placed) if table[one.name]["two_sided"] == "auto" and may_be_open(one, table)]
     if not asked or not any(max(row["E"]) > 0 for row in table.values()):
-        return said
-    from lib.formats.open_sheets import lit_on_both_sides  # rays, which few scenes need while they are read
+        return said, set()
+    from lib.formats.open_sheets import lit_sides  # rays, which few scenes need while they are read
 
-    return said | {placed[k].name for k in lit_on_both_sides(placed, table, asked)}
+    both, turned = lit_sides(placed, table, asked)
+    return said | {placed[k].name for k in both}, {placed[k].name for k in turned}
 
 
 def may_be_open(one, table):

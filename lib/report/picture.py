@@ -56,6 +56,8 @@ class Model:
     normal: np.ndarray  # (n_f, 3) geometric, any length
     ST: np.ndarray  # (n_f, 3, 2) texture coordinates of the corners
     colour: np.ndarray | None  # (n_f, 3, 3) vertex colours of the corners, None where no part has any
+    twin: np.ndarray  # (n_f,) the face that is the other side of the same triangle, or -1
+    order: np.ndarray  # (n_f, 3) corners in an order that twins have in common
     parts: list = field(repr=False)
 
     @property
@@ -77,7 +79,26 @@ def join(parts):
     face_part = np.repeat(np.arange(len(parts)), [len(p.F) for p in parts])
     mesh, corner = closest.prepare(V, F), V[F]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    return Model(mesh, face_part, normal, ST[F], colour, list(parts))
+    return Model(mesh, face_part, normal, ST[F], colour, *_twins(corner), list(parts))
+
+
+def _twins(corner):
+    """(twin (n_f,), order (n_f, 3)) of triangles (n_f, 3, 3): which lie in one another, wound the other way round."""
+    n = len(corner)
+    twin, order = np.full(n, -1), np.zeros((n, 3), dtype=np.int64)
+    if not n:
+        return twin, order
+    place = np.unique(np.ascontiguousarray(corner.reshape(-1, 3) + 0.0).view("V24").ravel(), return_inverse=True)[1]
+    place = place.reshape(n, 3)
+    order = np.argsort(place, axis=1, kind="stable")
+    same = np.unique(np.take_along_axis(place, order, axis=1), axis=0, return_inverse=True)[1].ravel()
+    by = np.argsort(same, kind="stable")
+    next_to = same[by[1:]] == same[by[:-1]]
+    a, b = by[:-1][next_to], by[1:][next_to]
+    step = (order[:, 1] - order[:, 0]) % 3  # 1 or 2: which way round
+    turned = step[a] != step[b]
+    twin[a[turned]], twin[b[turned]] = b[turned], a[turned]
+    return twin, order
 
 
 def first_visible(model, origin, direction):
@@ -92,6 +113,7 @@ def first_visible(model, origin, direction):
         hit = np.flatnonzero(face >= 0)
         behind = np.einsum("nx,nx->n", model.normal.take(face[hit], 0), direction.take(hit, 0)) > 0
         again = hit[behind & ~two_sided[model.face_part[face[hit]]]]
+        again = again[~_turned(model, face, weight, again)]
         if not len(again):
             break
         start = t[again] + step[again]
@@ -102,6 +124,19 @@ def first_visible(model, origin, direction):
     else:
         t[again], face[again], weight[again] = np.inf, -1, 0.0
     return t, face, weight
+
+
+def _turned(model, face, weight, rays):
+    """Hits of `rays` on the back of a face with a twin become hits on the twin, in place: which (k,) bool."""
+    twin = model.twin[face[rays]]
+    has = twin >= 0
+    of, old = rays[has], face[rays[has]]
+    moved = np.take_along_axis(weight[of], model.order[old], axis=1)
+    face[of] = twin[has]
+    out = np.zeros_like(moved)
+    np.put_along_axis(out, model.order[twin[has]], moved, axis=1)
+    weight[of] = out
+    return has
 
 
 def render(model, textures, camera, width, height, samples=2, background=BACKGROUND):

@@ -111,3 +111,16 @@ def test_a_closer_look_goes_to_the_finely_divided_part():
     at = np.array(near.eye) - direction * near.eye[2] / direction[2]
     assert at[:2] == pytest.approx([0.8, 0.8], abs=0.15)
     assert closer(join([Part(SQUARE, TRIANGLES)]), STRAIGHT, 100, 100) == STRAIGHT
+
+
+def test_two_faces_back_to_back_show_each_its_own_side():
+    """One square wound both ways, as both sides of a sheet: from the front the one texture, from behind the other."""
+    blue = texture(np.array([[[0, 0, 255]]], np.uint8))
+    front = Part(SQUARE, TRIANGLES, UPRIGHT, texture=0)
+    back = Part(SQUARE[[2, 3, 0, 1]], TRIANGLES[:, ::-1], UPRIGHT[[2, 3, 0, 1]], texture=1)
+    model = join([front, back])
+    image = render(model, [texture(), blue], STRAIGHT, 10, 10, samples=1)
+    assert image[2, 2].tolist() == [255, 0, 0] and image[7, 7].tolist() == [200, 150, 100]
+    assert image[7, 2].tolist() == [0, 0, 255] and image[2, 7].tolist() == [0, 255, 0]
+    behind = Camera((0.5, 0.5, -STRAIGHT.eye[2]), (0.5, 0.5, 0), 60)
+    assert (render(model, [texture(), blue], behind, 10, 10, samples=1) == [0, 0, 255]).all()
