@@ -21,6 +21,7 @@ from lib.surfaces.mesh_build import normals_areas
 PADDING = 4  # cells of the finest level between charts, and from the border: one cell two levels coarser
 LEAST_LEVEL, MOST_LEVEL = 3, 11
 AREA = 1e6
+MOST_CELLS = 8192  # a side, of a packing that is not kept
 TRIALS = 4  # packings until the map is nearly full
 MOST_STRETCH = 3.0  # of the mesh's own texture coordinates, between any two directions or places of a chart ...
 BAD_SHARE = 0.01  # ... but for this share of the area
@@ -136,7 +137,7 @@ def _cut(mesh, unit):
     atlas.add_mesh(V.astype(np.float32), mesh.F.astype(np.uint32))
     cutting, packing = xatlas.ChartOptions(), xatlas.PackOptions()
     cutting.max_iterations = 1
-    packing.texels_per_unit, packing.padding = 1.0, 0
+    packing.texels_per_unit, packing.padding = min(1.0, MOST_CELLS / np.ptp(V, axis=0).max()), 0
     atlas.generate(cutting, packing)
     _, index, uv = atlas.get_mesh(0)
     flat = (uv.astype(np.float64) * (atlas.width, atlas.height))[index]

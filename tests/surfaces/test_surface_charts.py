@@ -176,3 +176,10 @@ def test_own_coordinates_that_do_not_serve(change):
         )
         m = mesh(V, F, T=np.round(T, 12))[0]
     assert own_charts(m, 0.05) is None
+
+
+def test_a_strip_a_thousand_million_times_as_long_as_wide():
+    V = np.array([[0, 0, 0], [1e6, 0, 0], [1e6, 1e-3, 0], [0, 1e-3, 0], [1, 1, 1], [2, 1, 1], [1, 2, 1]])
+    m = charted(mesh(V, [[0, 1, 2], [0, 2, 3], [4, 5, 6]])[0], 0.01)
+    assert (m.level, m.chart.max()) == (MOST_LEVEL, 1)
+    assert PADDING <= m.uv.min() * 2**MOST_LEVEL and m.uv.max() * 2**MOST_LEVEL <= 2**MOST_LEVEL - PADDING
