@@ -17,7 +17,8 @@ def _samples(n):
     return w[(w >= 0).all(axis=1) & (w < n).all(axis=1)] / n
 
 
-FEW_SAMPLES, MANY_SAMPLES = np.concatenate([_samples(2), np.full((1, 3), 1 / 3)]), _samples(4)
+BETWEEN = np.array([[5, 5, 2], [5, 2, 5], [2, 5, 5]]) / 12  # of the edges' middles and the triangle's
+FEW_SAMPLES, MANY_SAMPLES = np.concatenate([_samples(2), np.full((1, 3), 1 / 3), BETWEEN]), _samples(4)
 
 
 @dataclass(frozen=True)
