@@ -2,11 +2,12 @@
 
 A level needs one number, the tolerance; how many triangles it will cost is known (of trimmed surfaces about) from the
 plan (lib.nurbs.lines) and the border points without cutting anything, so a count is met by bisection over the tolerance
-of all surfaces together: triangles go where the largest distances are.
+of all surfaces together: triangles go where the largest distances are.  Meshes have nothing exact but their triangles:
+they are thinned by quadrics, to the same tolerance (lib.lod.mesh_levels).
 
-Thinning a finer mesh by quadrics instead (fast_simplification, positions only: it gives up the parameters, seams and
-borders) was measured on the teapot, a sphere and a head: at 30 % to 1 % of the triangles its largest distance is 1.5 to
-5 times that of a level cut here, the root mean square 0.7 to 4.6 times.
+For other surfaces that was measured too, on the teapot, a sphere and a head thinned without regard to seams: at 30 %
+to 1 % of the triangles its largest distance is 1.5 to 5 times that of a level cut here, the root mean square 0.7 to 4.6
+times.
 """
 
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ import numpy as np
 from lib.nurbs import facets
 from lib.surfaces import tessellate
 from lib.surfaces.gaps import gap
+from lib.surfaces.mesh import Mesh
 
 DEVIATION = 1e-4  # of the frame: the finest level, where none is named
 SLIDE = 8  # a texture may slide as many tolerances, or tessellate.SLIDE of the surface's size if that is more
@@ -59,7 +61,12 @@ class Scene:
     def __init__(self, surfaces, known, lattice=None, copies=None):
         self.surfaces, self.known = surfaces, known
         self.copies = np.ones(len(surfaces), dtype=np.int64) if copies is None else np.asarray(copies)
-        self.pieces = tessellate.Pieces(surfaces, known, lattice)
+        kinds = dict(tessellate.KINDS)
+        if any(isinstance(s, Mesh) for s in surfaces):
+            from lib.lod.mesh_levels import MeshLevels  # here: it takes longer to load than most scenes to cut
+
+            kinds[Mesh] = MeshLevels
+        self.pieces = tessellate.Pieces(surfaces, known, lattice, kinds)
         self.size = known.extent.max(axis=1)
 
     def asked_of(self, tolerance):

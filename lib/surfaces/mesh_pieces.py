@@ -13,7 +13,7 @@ class MeshPieces:
 
     def __init__(self, surfaces, known, lattice=None):
         self.surfaces = surfaces
-        self._made = [_patch(mesh) for mesh in surfaces]
+        self._made = [as_patch(mesh) for mesh in surfaces]
 
     def n_triangles(self, tolerance, slide):
         """Triangles (n,)."""
@@ -34,7 +34,7 @@ class MeshPieces:
         return self._made[s][1]
 
 
-def _patch(mesh):
+def as_patch(mesh):
     """The Patch of a Mesh and the normals of its vertices."""
     m = len(mesh.F)
     uv = np.zeros((m, 3, 2)) if mesh.uv is None else mesh.uv
