@@ -1,5 +1,7 @@
 """Trimmed surfaces cut into triangles: nothing in holes, edges shared bit for bit, close at every tolerance."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -148,6 +150,13 @@ def test_round_piece_of_a_sphere(tolerance):
     assert 1 - np.linalg.norm(A + a * (B - A) + b * (C - A), axis=2).min() <= tolerance * 1.01  # found at samples
 
 
+def test_an_edge_that_says_too_little_gets_more_points():
+    """Significances ten times too small: the wall is measured all the same, and its edges kept closer."""
+    surfaces = [replace(s, significance=s.significance / 10) for s in can()]
+    found = level(surfaces, 0.01)
+    assert found.mesh.distance[0] <= 0.01 and in_closed_shell(found.mesh.V, found.mesh.F).all()
+
+
 def test_a_crack_is_measured():
     """The lid's rim moved away by a hundredth of the tolerance is no longer the wall's: an open can, a gap."""
     surfaces = can()
@@ -228,7 +237,7 @@ def test_a_crease_is_an_edge():
     """An L of two walls, a window in each so near to the bend that the shortest edges would run across it."""
     bent = extruded([[0, 0], [1, 0], [1, 1]], 1.0, knots=[0, 0, 0.5, 1, 1])
     outline = np.array([[0, 0], [0.5, 0], [1, 0], [1, 1], [0.5, 1], [0, 1]])
-    windows = [circle((u, 0.5), 0.24, 200, True) for u in (0.25, 0.75)]
+    windows = [circle((0.26, 0.5), 0.235, 200, True), circle((0.74, 0.42), 0.23, 200, True)]
     kept = [np.full(6, np.inf), *2 * [np.where(np.arange(200) % 10 == 0, np.inf, 0.0)]]
     mesh = level([cut_out(bent, [outline, *windows], significances=kept)], 0.02).mesh
     on = [np.isclose(mesh.V[mesh.F][..., 1], 0).all(axis=1), np.isclose(mesh.V[mesh.F][..., 0], 1).all(axis=1)]
