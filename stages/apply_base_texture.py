@@ -61,7 +61,7 @@ def body(args, cost):
                 surface,
                 picture,
                 textures[name]["repeat"],
-                rho_avg[name],
+                picture_average(rho_avg[name], textures[name].get("factor")),
                 texture_level,
             )
         else:
@@ -94,7 +94,10 @@ def located(textures, folder_file):
     if all(Path(row["file"]).is_absolute() for row in textures.values()):
         return textures
     folder = Path(read_json(folder_file)["folder"])
-    return {name: {**row, "file": str(folder / row["file"])} for name, row in textures.items()}
+    return {
+        name: row if row.get("embedded") else {**row, "file": str(folder / row["file"])}
+        for name, row in textures.items()
+    }
 
 
 def checked_level(level):
@@ -119,6 +122,13 @@ def group_weights(groups, intensity, n_groups):
     if not (np.isfinite(weights) & (weights >= 0)).all():
         raise Refusal(f"intensity: {intensity}, expected finite numbers >= 0")
     return weights
+
+
+def picture_average(rho_avg, factor):
+    """Average of a picture alone, of a surface whose reflectance is the picture times `factor` (3,), or None."""
+    if factor is None:
+        return rho_avg
+    return np.divide(rho_avg, factor, out=np.zeros(3), where=np.asarray(factor) > 0)
 
 
 def load_picture(texture, name, loaded, used):

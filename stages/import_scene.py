@@ -22,7 +22,8 @@ def arguments(parser):
 
 def body(args, cost):
     at = artefact.read_json(Path(args.scene_slice).parent / "folder.json")
-    made = scene_import.read(artefact.read_json(args.scene_slice), at["folder"], at["file"])
+    cache = Path(args.scene_slice).parents[1] / "cache"
+    made = scene_import.read(artefact.read_json(args.scene_slice), at["folder"], at["file"], cache)
     for warning in made.warnings:
         door.warn(warning)
     scene.save(args.out, made)

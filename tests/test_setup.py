@@ -26,7 +26,6 @@ IMPORT_NAMES = {  # others: - is _
     "open3d-cpu": "open3d", "pyyaml": "yaml", "openimageio": "OpenImageIO", "cadquery-ocp-novtk": "OCP",
 }  # fmt: skip
 COMMANDS = {"snakemake", "pytest"}  # run rather than imported
-NOT_YET = {"fast-simplification", "xatlas", "pythoncdt"}  # for meshes; the README says so
 
 needs_make = pytest.mark.skipif(not shutil.which("make"), reason="no make here")
 
@@ -84,7 +83,7 @@ def test_what_is_declared_is_used():
     used = set().union(*imported().values()) | COMMANDS
     source = " ".join(path.read_text(encoding="utf-8") for path in (ROOT / "lib").rglob("*.py"))
     unused = {r.name for r in REQUIRED if import_name(r) not in used and f'"{import_name(r)}' not in source}
-    assert unused == NOT_YET
+    assert not unused
 
 
 def test_readme_and_makefile_name_the_same_system_packages():

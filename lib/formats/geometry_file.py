@@ -1,7 +1,9 @@
 """One geometry file, of any kind that is read, as surfaces in the file's own unit."""
 
 import hashlib
+import re
 from pathlib import Path
+from urllib.parse import unquote
 
 from lib.formats.mistakes import Mistakes
 from lib.formats.patches import Report
@@ -15,6 +17,7 @@ KINDS = {
     ".obj": "Wavefront", ".glb": "glTF", ".gltf": "glTF",
     ".step": "STEP", ".stp": "STEP", ".iges": "IGES", ".igs": "IGES",
 }  # fmt: skip
+SLOW = (".3dm", ".obj", ".glb", ".gltf", ".step", ".stp", ".iges", ".igs")  # worth keeping what was read
 PACKED = (".zip", ".gz", ".7z", ".rar", ".tar", ".tgz", ".bz2", ".xz", ".zst")
 
 
@@ -25,11 +28,39 @@ def read(path, file, name, only=None, trimmed="keep", root=None, cache=None):
     only : pattern of layers, groups, objects, materials or patch numbers, or None
     trimmed : "keep", "skip" or "refuse" faces with trims
     root : the scene's folder, where textures of a .3dm may lie too, or None
-    cache : folder where conversions of STEP and IGES files are kept, or None
+    cache : folder where readings of SLOW kinds are kept (see geometry_cache), or None
 
     Raises Refusal, listing every mistake found in the file.
     """
+    path, how = Path(path), (only, trimmed, str(root))
+    if cache is None or path.suffix.lower() not in SLOW or not path.is_file():
+        return _read(path, file, name, only, trimmed, root)
+    from lib.formats import geometry_cache
+
+    key = geometry_cache.key(path, path.read_bytes(), *how)
+    content = geometry_cache.load(cache, key)
+    if content is None:
+        content = _read(path, file, name, only, trimmed, root)
+        geometry_cache.save(cache, key, content)
+    return content
+
+
+def companions(path):
+    """Names of the files that a geometry file draws on, below its folder: material libraries, buffers."""
     path = Path(path)
+    if path.suffix.lower() == ".obj":
+        lines = re.findall(rb"^[ \t]*mtllib[ \t]+(.+?)[ \t]*\r?$", path.read_bytes(), re.MULTILINE)
+        lines = [line.decode("utf-8", "replace") for line in lines]
+        found = [name for line in lines for name in (line, *line.split())]
+    elif path.suffix.lower() == ".gltf":
+        found = re.findall(r'"uri"\s*:\s*"([^":]+\.bin)"', path.read_text(encoding="utf-8", errors="replace"))
+        found = [unquote(name) for name in found]
+    else:
+        found = []
+    return sorted({name for name in found if (path.parent / name).is_file()})
+
+
+def _read(path, file, name, only, trimmed, root):
     kind = path.suffix.lower()
     if kind in PACKED:
         raise refusal(f"is packed ({kind}): unpack it and name the file inside", file, name, "file")
@@ -59,7 +90,7 @@ def read(path, file, name, only=None, trimmed="keep", root=None, cache=None):
     elif is_step:
         from lib.formats import step
 
-        content = step.read(path, data, report, only, trimmed, cache)
+        content = step.read(path, data, report, only, trimmed)
     elif kind == ".json":
         from lib.formats import geomdl_json
 

@@ -8,10 +8,10 @@ from lib.formats import artefact, geometry_file, pictures, scene, scene_import, 
 from lib.formats.mistakes import Mistakes
 from lib.maps.base_texture import rho_average
 from lib.maps.budget import gpu_bytes, smallest_total
-from lib.surfaces.tessellate import frame
 from lib.refusal import Refusal
 from lib.surfaces.measure import extent
 from lib.surfaces.mesh import Mesh
+from lib.surfaces.tessellate import frame
 
 DIGITS = 4  # of an average reflectance: a repainted texture whose average moves less re-bakes nothing
 AUTO = "auto"  # the reconstruction of surfaces that ask for none
@@ -39,13 +39,15 @@ def run(folder, overrides=None, pictures_folder=None):
 
     pictures_folder : where pictures embedded in geometry files are put, by their content
     """
-    model = scene_model.read(folder, overrides)
+    model = scene_model.read(
+        folder, overrides, None if pictures_folder is None else Path(pictures_folder).parent / "cache"
+    )
     source, wanted, placed, table, made = model.source, model.settings, model.placed, model.table, model.scene
     scene.check(made, source.file)
     keep_pictures(model.pictures, pictures_folder)
     warnings = list(made.warnings)
     textures, rho_avg = _reflectances(source, wanted, made, pictures_folder, warnings)
-    digests = {name: geometry_file.digest(source.folder / name) for name in _geometry_files(wanted)}
+    digests = {name: geometry_file.digest(source.folder / name) for name in _geometry_files(wanted, source.folder)}
     pictures_used = {row["file"]: geometry_file.digest(row["file"]) for row in textures.values()}
     resolved = settings.resolve(wanted, float(frame(made.surfaces)[1]))
     _check_budget(resolved["budget"], source, made)
@@ -103,8 +105,11 @@ def _check_budget(T, source, made):
         mistakes.stop()
 
 
-def _geometry_files(wanted):
-    return sorted({entry["file"] for entry in wanted["geometry"] if "file" in entry})
+def _geometry_files(wanted, folder):
+    """The files that geometry is read from, and those they draw on, relative to the scene's folder."""
+    named = {entry["file"] for entry in wanted["geometry"] if "file" in entry}
+    beside = {str(Path(name).parent / other) for name in named for other in geometry_file.companions(folder / name)}
+    return sorted(named | beside)
 
 
 def keep_pictures(found, folder):
@@ -135,6 +140,10 @@ def _reflectances(source, wanted, made, pictures_folder, warnings):
             "colour_space": material.get("colour_space", _colour_space(material["texture"])),
             "repeat": [float(n) for n in material.get("repeat", [1, 1])],
         }
+        if embedded:
+            row["embedded"] = True
+        if "reflectance" in material:  # of a file: a factor on its picture
+            row["factor"] = scene_table.reflectance(material)
         key = (row["file"], row["colour_space"])
         if key not in opened:
             opened[key] = _picture(source, name, material["texture"], row, mistakes, warnings)
@@ -144,7 +153,7 @@ def _reflectances(source, wanted, made, pictures_folder, warnings):
                 mistakes.add("the mesh has no texture coordinates", source.file, name, "texture")
                 continue
             textures[name] = row
-            rho = rho_average(surface, opened[key], tuple(row["repeat"]))
+            rho = rho_average(surface, opened[key], tuple(row["repeat"])) * row.get("factor", 1.0)
             rho_avg[name] = [min(round(float(x), DIGITS), 1.0) for x in rho]
     mistakes.stop()
     _warn_bright(made, rho_avg, warnings)

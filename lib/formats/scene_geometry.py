@@ -34,7 +34,7 @@ class Placed:
     name : its name;  object : name of the placed entry it belongs to;  entry : index of that entry
     surface : of any kind, world metres;  flip : the lit side is against S_u x S_v;  area : [m^2]
     material : name of the file's material, or None;  solid : as lib.formats.patches.Patch has it
-    part, M : the file's own surface and the map (4, 4) that made this one of it: copies share one
+    part, M : the file's Patch and the map (4, 4) that made this surface of it
     front : name of the surface whose back this is, or None
     """
 
@@ -93,13 +93,14 @@ class _Brought:
         return names_of
 
 
-def load(entries, units, folder, file, where=None, up="z"):
+def load(entries, units, folder, file, where=None, up="z", cache=None):
     """Read and place all geometry: Loaded.
 
     entries : geometry of scene.yaml;  units : the scene's unit
     folder : where files lie;  file : scene.yaml as messages name it
     where : function of a path of keys to (file, line), or None;  up : the scene's, "y" or "z": files that state
         theirs are turned
+    cache : folder where readings of files are kept, or None
 
     Raises Refusal listing every mistake of all entries.
     """
@@ -111,7 +112,7 @@ def load(entries, units, folder, file, where=None, up="z"):
             if "file" in entry:
                 key = (entry["file"], entry.get("only"), entry.get("trimmed", TRIMMED))
                 if key not in contents:
-                    contents[key] = _read(entry, folder, file)
+                    contents[key] = _read(entry, folder, file, cache)
                     named[key] = brought.add(entry["file"], contents[key])
                     notes += [f"{entry['file']}: {note}" for note in contents[key].notes]
                 parts, total = contents[key].patches, contents[key].total
@@ -139,10 +140,10 @@ def load(entries, units, folder, file, where=None, up="z"):
     return Loaded(placed, list(dict.fromkeys(notes)), brought.materials, brought.pictures)
 
 
-def _read(entry, folder, file):
+def _read(entry, folder, file, cache):
     shown = str(Path(file).parent / entry["file"])
     name, only, trimmed = entry_name(entry), entry.get("only"), entry.get("trimmed", TRIMMED)
-    return geometry_file.read(Path(folder) / entry["file"], shown, name, only, trimmed, root=Path(folder))
+    return geometry_file.read(Path(folder) / entry["file"], shown, name, only, trimmed, Path(folder), cache)
 
 
 def inline(entry):
@@ -214,7 +215,7 @@ def _placed(entry, index, parts, total, to_units, own, areas, mistakes, where):
             made = _world(part.surface, M, full, index, areas, mistakes, where)
             if made is not None:
                 flip = bool(part.flip) ^ bool(mirrored) ^ bool(entry.get("flip", False))
-                facts = (material_of.get(part.material), part.solid, part.surface, M)
+                facts = (material_of.get(part.material), part.solid, part, M)
                 result.append(Placed(full, name, index, made[0], flip, made[1], *facts))
     return result
 

@@ -16,7 +16,7 @@ from lib.nurbs.coincident import coincident
 from lib.nurbs.surface import NurbsSurface
 from lib.refusal import refusal
 from lib.surfaces import tessellate
-from lib.surfaces.measure import hull, transformed
+from lib.surfaces.measure import area, hull, transformed
 from lib.surfaces.mesh import Mesh
 
 GEOMETRY_KEYS = (
@@ -51,7 +51,7 @@ def geometry_slice(settings, table, digests):
     }
 
 
-def read(piece, folder, file):
+def read(piece, folder, file, cache=None):
     """Read the geometry a slice names and return its Scene.
 
     folder : of the scene;  file : scene.yaml as messages name it
@@ -63,7 +63,9 @@ def read(piece, folder, file):
         if not path.is_file() or geometry_file.digest(path) != digest:
             shown = Path(file).parent / written
             raise refusal("changed while the bake ran; start it again", file=shown)
-    placed, notes, *_ = scene_geometry.load(piece["geometry"], piece["units"], folder, file, up=piece["up"])
+    placed, notes, *_ = scene_geometry.load(
+        piece["geometry"], piece["units"], folder, file, up=piece["up"], cache=cache
+    )
     front = {one.name: one for one in placed}
     for name, row in piece["surfaces"].items():
         if row["front"] is not None:
@@ -86,14 +88,16 @@ def with_charts(placed, entries):
     scale = tessellate.frame([one.surface for one in placed])[1]
     made, out = {}, {}
     for one in meshes:
-        size = float(np.cbrt(abs(np.linalg.det(one.M[:3, :3]))))
-        key = id(one.part), round(size, 12), entries[one.entry].get("uv", "charts")
+        size, entry, mesh = float(np.cbrt(abs(np.linalg.det(one.M[:3, :3])))), entries[one.entry], one.part.surface
+        shape = (entry["file"], one.part.shape) if one.part.shape else id(one.part)
+        key = shape, round(size, 12), round(area(mesh), 12), entry.get("uv", "charts")
         if key not in made:
             texel = min(FINEST * scale, np.sqrt(one.area) / MOST_CELLS) / size
-            own = charts.own_charts(one.part) if key[2] == "own" else None
-            made[key] = own or charts.charted(one.part, texel)
+            own = charts.own_charts(mesh, texel) if key[-1] == "own" else None
+            made[key] = own or charts.charted(mesh, texel)
         if one.front is None:
-            out[one.name] = transformed(made[key], one.M)
+            atlas = made[key]
+            out[one.name] = transformed(replace(mesh, uv=atlas.uv, chart=atlas.chart, level=atlas.level), one.M)
     return [
         replace(one, surface=out[one.front or one.name]) if isinstance(one.surface, Mesh) else one for one in placed
     ]

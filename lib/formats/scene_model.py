@@ -33,15 +33,15 @@ class Model:
     pictures: dict
 
 
-def read(folder, overrides=None):
-    """Read the scene in `folder`; Refusal lists what is wrong."""
+def read(folder, overrides=None, cache=None):
+    """Read the scene in `folder`; Refusal lists what is wrong.  cache : folder where readings of files are kept."""
     source = scene_folder.read(folder, overrides)
     scene_rules.check(source)
     settings = dict(source.settings)
     where = source.where
 
     def load(entries):
-        return scene_geometry.load(entries, settings["units"], source.folder, source.file, where, settings["up"])
+        return scene_geometry.load(entries, settings["units"], source.folder, source.file, where, settings["up"], cache)
 
     placed, notes, brought, pictures = load(settings["geometry"])
     settings["materials"] = {**brought, **settings.get("materials", {})}

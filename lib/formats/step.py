@@ -5,13 +5,11 @@ this process goes on.
 """
 
 import fnmatch
-import hashlib
 import re
 import signal
 import subprocess
 import sys
 import tempfile
-from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -37,15 +35,14 @@ GAP_TOLD, GAP_REFUSED = 1e-4, 1e-2  # of a face's size: edges farther than this 
 TAIL = 4000  # bytes of the converter's messages that are looked at
 
 
-def read(path, data, report, only=None, trims="keep", cache=None):
+def read(path, data, report, only=None, trims="keep"):
     """Read the STEP or IGES file at `path`, whose bytes are `data`, as a GeometryFile; mistakes go to `report`.
 
     trims : "keep", "skip" or "refuse" faces with trims
-    cache : folder for conversions, by the digest of file and converter, or None
 
     Faces are numbered in the order of the file over all parts where they stand, whatever `only` and `trims` leave out.
     """
-    faces = _converted(Path(path), data, report, cache)
+    faces = _converted(Path(path), report)
     where = [(place, face) for place in faces.instances for face in _faces_of(faces, place)]
     report.total = len(where)
     if not where:
@@ -55,16 +52,8 @@ def read(path, data, report, only=None, trims="keep", cache=None):
     return _Patches(faces, report, only, trims).read(where)
 
 
-def _converted(path, data, report, cache):
-    """StepFaces of the file, from the cache if it is there."""
-    key = hashlib.sha256(data)
-    key.update(path.suffix.lower().encode())
-    for source in sorted(Path(__file__).parent.glob("step_*.py")):
-        key.update(source.read_bytes())
-    kept = None if cache is None else Path(cache) / f"{key.hexdigest()[:32]}.npz"
-    if kept is not None:
-        with suppress(ArtefactError):
-            return step_result.load(kept)
+def _converted(path, report):
+    """StepFaces of the file, converted in a process of its own."""
     with tempfile.TemporaryDirectory(prefix="step_") as folder:
         out = Path(folder) / "faces.npz"
         complaint = _run(path.resolve(), out, Path(folder) / "messages")
@@ -74,9 +63,6 @@ def _converted(path, data, report, cache):
             faces = step_result.load(out)
         except ArtefactError as error:
             report.fatal(f"its conversion gave no result ({str(error).removeprefix(f'{out}: ')})", field="file")
-    if kept is not None:
-        with suppress(ArtefactError):  # a second conversion costs seconds, no more
-            step_result.save(kept, faces)
     return faces
 
 

@@ -8,7 +8,8 @@ from lib.surfaces.trimmed import TrimmedSurface
 
 NURBS, TRIMMED, MESH, BACK = range(4)
 NAMES = (
-    "kind", "degree", "size", "knots", "Pw", "trim_size", "loop_size", "trim_box", "trim_uv", "trim_S", "trim_significance",
+    "kind", "degree", "size", "knots", "Pw", "trim_size", "loop_size", "trim_box", "trim_uv", "trim_S",
+    "trim_significance",
     "mesh_size", "mesh_V", "mesh_F", "mesh_N", "mesh_T", "mesh_uv", "mesh_chart",
 )  # fmt: skip
 

@@ -142,7 +142,7 @@ def test_values_out_of_their_range_are_refused_with_the_range(written, said):
         ("{name: a, file: b.bpt, place: {scale: 0}}", "place.scale: 0 is not allowed; expected a number other than 0"),
         ("{name: a, file: b.bpt, place: {scale: [1, 2]}}", "place.scale: expected a list of 3, found 2"),
         ("{name: a, file: b.bpt, place: [{rotate: {axis: [0, 0, 1]}}]}", "place[0].rotate: degrees is missing"),
-        ("{name: a, file: b.bpt, trimmed: no way}", "trimmed: 'no way' is not allowed; expected keep or skip or refuse"),
+        ("{name: a, file: b.bpt, trimmed: what}", "trimmed: 'what' is not allowed; expected keep or skip or refuse"),
         ("{name: a, nurbs: {degree_u: 0, degree_v: 1, points: []}}", "nurbs.degree_u: 0 is out of range"),
         ("{name: a, nurbs: {degree_u: 1.5, degree_v: 1, points: []}}", "nurbs.degree_u: expected a whole number"),
         ("{name: a, nurbs: {degree_u: 1, degree_v: 1, points: []}}", "nurbs.points: the list is empty"),
