@@ -1,15 +1,16 @@
 """The order in which a mesh loses its vertices, and what is left of it after any number of steps.
 
 fast_simplification collapses edges in the order of their quadric errors (Garland and Heckbert 1997) and says which
-vertex went into which; run once to the end, every coarser mesh is a prefix of that list, and every triangle of it descends from one of
-the given triangles.  Three kinds of triangles are added before, and make it keep what it knows nothing of:
+vertex went into which.  Run once to the end, every coarser mesh is a prefix of that list, and each of its triangles
+descends from a given one, from which the library turns it by less than 80 degrees.  Three kinds of triangles are added
+before, and make it keep what it knows nothing of:
 
 - skirts: along every seam and border, a triangle perpendicular to the surface, so that vertices stay on the line;
 - locks: where seams meet or end, two triangles that hold the vertex in all directions;
 - tags: at every vertex a triangle of its own that touches nothing else.  Its edges have one user, so the vertex counts
   as a border vertex, and merged vertices go to one of the two places or halfway between.  Otherwise the library takes
   the place where the quadric is least, by determinants without any tolerance: on a plane that is not parallel to the
-  axes these are rounding errors (version 0.2.0: a plane of 7200 triangles keeps 2800 of them, parallel to the axes 2).
+  axes these are rounding errors (version 0.2.0: a plane of 7200 triangles keeps 2800, however few are asked for).
 
 Their far corners collapse into the vertex at no cost, the planes remain in its quadric.
 """
