@@ -7,6 +7,7 @@ import pytest
 
 from lib.lod.levels import Scene
 from lib.nurbs import evaluate
+from lib.nurbs.surface import bezier
 from lib.surfaces import measure, tessellate
 from lib.surfaces.closed import in_closed_shell
 from lib.surfaces.gaps import gap
@@ -14,6 +15,7 @@ from lib.surfaces.loops import inside
 from lib.surfaces.mesh import Mesh
 from lib.surfaces.trim_cut import TrimmedPieces
 from lib.surfaces.trim_flat import without_flat
+from lib.surfaces.trim_flip import flipped
 from lib.surfaces.trim_mesh import domain_triangles
 from tests.shapes import box, extruded, rectangle, sphere
 from tests.surfaces.trimmed_shapes import (
@@ -242,6 +244,21 @@ def test_a_crease_is_an_edge():
     mesh = level([cut_out(bent, [outline, *windows], significances=kept)], 0.02).mesh
     on = [np.isclose(mesh.V[mesh.F][..., 1], 0).all(axis=1), np.isclose(mesh.V[mesh.F][..., 0], 1).all(axis=1)]
     assert (on[0] | on[1]).all() and mesh.distance[0] <= 0.02
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_diagonal_follows_the_saddle(sign):
+    """(x + y)^2 is straight along x + y = 1, (x - y)^2 along x = y; a diagonal that is fixed stays."""
+    x, square = np.array([0, 0.5, 1]), np.array([0.0, 0.0, 1.0])  # control values of t and t^2
+    P = np.stack(np.broadcast_arrays(x[:, None], x, square[:, None] + square + 2 * sign * np.outer(x, x)), axis=-1)
+    rising, failing = np.array([[0, 1, 2], [0, 2, 3]]), np.array([True, False])
+    S = evaluate.point(bezier(P), *SQUARE.T)
+    around = np.array([[0, 1], [1, 2], [2, 3], [3, 0]])
+    found = flipped(bezier(P), S, SQUARE, rising, failing, around)
+    both = set(found[0]) & set(found[1])
+    assert both == ({1, 3} if sign == 1 else {0, 2}) and (cross(S, found)[:, 2] > 0).all()
+    fixed = np.concatenate([around, [[0, 2]]])
+    assert np.array_equal(flipped(bezier(P), S, SQUARE, rising, failing, fixed), rising)
 
 
 def test_flat_triangles_are_flipped_not_left_out():
