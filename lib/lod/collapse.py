@@ -1,6 +1,6 @@
 """The order in which a mesh loses its vertices, and what is left of it after any number of steps.
 
-fast_simplification collapses edges in the order of their quadric errors (Garland and Heckbert 1997) and says which
+fast_simplification collapses edges in the order of their quadric errors (Garland, Heckbert 1997) and says which
 vertex went into which.  Run once to the end, every coarser mesh is a prefix of that list, and each of its triangles
 descends from a given one, from which the library turns it by less than 80 degrees.  Three kinds of triangles are added
 before, and make it keep what it knows nothing of:

@@ -62,10 +62,10 @@ class Original:
         P, uv = np.concatenate([V, within(V[some])]), np.concatenate([UV, within(UV[some])])
         off_made = _nearest(self._shape, P)[0]
         distance = float(max(off.max(), off_made.max()))
-        slide = 0.0 if self.mesh.uv is None else float(np.linalg.norm(self._at(uv) - P, axis=1).max())
+        slide = 0.0 if self.mesh.uv is None else float(np.linalg.norm(self.at(uv) - P, axis=1).max())
         return Measured(distance, float(share @ off**2), max(slide, distance))
 
-    def _at(self, uv):
+    def at(self, uv):
         """Places (n, 3) of uv (n, 2), or of the closest pairs in a chart."""
         _, face, weight = _nearest(self._map, np.concatenate([uv, np.zeros((len(uv), 1))], axis=1))
         return np.einsum("nk,nkc->nc", weight, self.mesh.V[self.mesh.F[face]])

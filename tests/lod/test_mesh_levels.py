@@ -8,8 +8,11 @@ import pytest
 
 from lib.lod import carry, collapse
 from lib.lod.levels import Scene
+from lib.lod.mesh_distance import Original
 from lib.lod.mesh_levels import Ladder, MeshLevels, touching
 from lib.nurbs.facets import normals
+from lib.report import picture
+from lib.report.camera import Camera
 from lib.surfaces import tessellate
 from lib.surfaces.closed import in_closed_shell
 from lib.surfaces.measure import corners, transformed
@@ -235,6 +238,24 @@ def test_a_small_mesh_does_not_hold_up_the_one_it_touches():
     patches = ladder.by_count(100)
     assert sum(len(patch.F) for patch in patches) <= 100 and len(patches[0].F) == 1
     assert ladder.predicted(np.full(2, 0.5), np.full(2, 4.0))[0] == 1
+
+
+@pytest.mark.parametrize("count", [6912, 3456, 700, 140])
+def test_a_picture_shows_the_texture_where_it_was(ball, count):
+    """The map holds the place of each of its texels; every ray must see its own place, to the slide."""
+    (patch,) = ball.by_count(count)
+    side = 256
+    uv = np.stack(np.meshgrid(*2 * [(np.arange(side) + 0.5) / side]), axis=2).reshape(-1, 2)
+    rgb = Original(ball.meshes[0]).at(uv).reshape(side, side, 3).astype(np.float32)
+    model = picture.join([picture.Part(patch.S, patch.F, ST=patch.UV, texture=0)])
+    origin, direction = Camera((3.0, 2.0, 1.0), (0.0, 0.0, 0.0), 45.0).rays(120, 120)
+    t, face, weight = picture.first_visible(model, origin, direction)
+    hit = face >= 0
+    seen = picture.shade(model, [picture.Texture(rgb, ("clamp", "clamp"))], face, weight)[hit]
+    off = np.linalg.norm(seen - (origin + t[:, None] * direction)[hit], axis=1)
+    cell = np.pi / 2 / (0.28 * side)  # of the map, on the sphere
+    assert 0.2 < hit.mean() < 0.8
+    assert off.max() <= 1.1 * patch.slide + cell and np.sqrt((off**2).mean()) <= patch.slide / 2 + cell / 2
 
 
 def test_the_same_mesh_gives_the_same_levels():
