@@ -46,7 +46,8 @@ class TrimmedPieces:
         both = np.stack([tolerance, slide], axis=1)
         return both, find_lines.steps(self.plan, both)
 
-    def _lines(self, tolerance, slide):
+    def lines(self, tolerance, slide):
+        """The Lines of each surface for tolerance (n,) and slide (n,)."""
         both, count = self._steps(tolerance, slide)
         placed = find_lines.place(self.plan, both, count)
         out = []
@@ -59,7 +60,7 @@ class TrimmedPieces:
     def cut(self, tolerance, slide):
         """A list of Patch for tolerance (n,) and slide (n,), cut once, with a correction where that is far off."""
         job = _Job(self, FAR_OFF * tolerance)
-        return job.cut(self._lines(tolerance, slide), ROUGH_ROUNDS)
+        return job.cut(self.lines(tolerance, slide), ROUGH_ROUNDS)
 
     def cut_within(self, tolerance, slide):
         """A list of Patch within tolerance (n,); what is reached is in the patches.
@@ -69,19 +70,19 @@ class TrimmedPieces:
         """
         pieces, job = self, _Job(self, tolerance)
         for _ in range(LESSONS):
-            patches = job.cut(pieces._lines(tolerance, slide), 0)
+            patches = job.cut(pieces.lines(tolerance, slide), 0)
             better = pieces.learned(patches, tolerance, slide)
             if better is None:
                 break
             job.forget([p.distance > FAR_OFF * t for p, t in zip(patches, tolerance, strict=True)])
             pieces = better
         job.forget([p is None or p.distance > t for p, t in zip(job.patches, tolerance, strict=True)])
-        return job.cut(pieces._lines(tolerance, slide), ROUNDS)
+        return job.cut(pieces.lines(tolerance, slide), ROUNDS)
 
     def learned(self, patches, tolerance, slide):
         """The pieces measured finer where `patches` miss tolerance (n,) by far; None if nowhere."""
         over = np.flatnonzero([q.distance > FAR_OFF * t for q, t in zip(patches, tolerance, strict=True)])
-        demands, lines = list(self.plan.demands), self._lines(tolerance, slide)
+        demands, lines = list(self.plan.demands), self.lines(tolerance, slide)
         for s in over:
             own = (self.surfaces[s].base, self.known.is_closed[s], self.known.is_collapsed[s])
             placed = (lines[s].u, lines[s].v)
