@@ -44,7 +44,7 @@ STAGE = f"{OUT}/stages"
 SLICES = rule_settings(scene.settings, scene.warnings, scene.tolerances, scene.reconstruction)
 SETTINGS = short(SLICES, f"{OUT}/settings")
 MAPPED = [f for f, role, black in zip(scene.files, scene.roles, scene.is_black) if role != "cast_only" and not black]
-N_CHUNKS = n_chunks(scene.settings, len(MAPPED))
+N_CHUNKS = n_chunks(scene.settings, len(MAPPED), scene.mesh_cells)
 CHUNKS = range(N_CHUNKS)
 LEVELS = range(len(scene.settings["lods"]))
 MAPS = [f"{OUT}/maps/{file}.exr" for file in MAPPED]

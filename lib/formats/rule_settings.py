@@ -10,6 +10,7 @@ from lib.radiosity.quality import quality
 
 RAYS_A_JOB = 12e6  # about 4 s of one core
 MOST_CHUNKS = 64
+MESH_RAYS = 12  # a finest cell of a mesh's map: a fifth of them is sampled
 SHADOW_RAYS = 24  # a sample, of a few lights in view
 GATHER_RAYS = 0.1  # of a sample, an element of the coarse solution: roughly what a tolerance asks for with as many
 MOST_WARNINGS = 100  # told the report
@@ -93,9 +94,10 @@ def chosen_quality(bake):
     return q
 
 
-def n_chunks(settings, n_maps):
+def n_chunks(settings, n_maps, mesh_cells=0):
     """Number of jobs the surfaces are shared among: asked for, or by the rays the scene will need.
 
+    mesh_cells : finest cells on all meshes, many of which are sampled whatever the light, along the borders of charts
     The tolerance does not count: a changed one must not sample again.
     """
     asked = settings["bake"]["chunks"]
@@ -104,4 +106,5 @@ def n_chunks(settings, n_maps):
     q = chosen_quality(settings["bake"])
     samples = n_maps * (2 ** q["base_direct"] + 1) ** 2
     rays = 3 * samples * SHADOW_RAYS + 3 * n_maps * (2 ** q["base_indirect"] + 1) ** 2 * GATHER_RAYS * q["n_elements"]
+    rays += MESH_RAYS * mesh_cells
     return int(min(MOST_CHUNKS, max(1, -(-rays // RAYS_A_JOB))))

@@ -49,7 +49,8 @@ def run(folder, overrides=None, pictures_folder=None):
     textures, rho_avg = _reflectances(source, wanted, made, pictures_folder, warnings)
     digests = {name: geometry_file.digest(source.folder / name) for name in _geometry_files(wanted, source.folder)}
     pictures_used = {row["file"]: geometry_file.digest(row["file"]) for row in textures.values()}
-    resolved = settings.resolve(wanted, float(frame(made.surfaces)[1]))
+    largest = float(frame(made.surfaces)[1])
+    resolved = settings.resolve(wanted, largest)
     _check_budget(resolved["budget"], source, made)
     area = {one.name: one.area for one in placed}
     materials = wanted.get("materials", {})
@@ -67,6 +68,11 @@ def run(folder, overrides=None, pictures_folder=None):
         "rho_avg": rho_avg,
         "geometry_files": [str(source.folder / name) for name in digests],
         "texture_files": sorted(pictures_used),
+        "mesh_cells": sum(
+            round(one.area / scene_import.finest_cell(one.area, largest) ** 2)
+            for one in placed
+            if isinstance(one.surface, Mesh) and not table[one.name]["is_black"]
+        ),
         "warnings": warnings,
     }
     slices = {

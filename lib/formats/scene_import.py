@@ -92,7 +92,7 @@ def with_charts(placed, entries):
         shape = (entry["file"], one.part.shape) if one.part.shape else id(one.part)
         key = shape, round(size, 12), round(area(mesh), 12), entry.get("uv", "charts")
         if key not in made:
-            texel = min(FINEST * scale, np.sqrt(one.area) / MOST_CELLS) / size
+            texel = finest_cell(one.area, scale) / size
             own = charts.own_charts(mesh, texel) if key[-1] == "own" else None
             made[key] = own or charts.charted(mesh, texel)
         if one.front is None:
@@ -101,6 +101,11 @@ def with_charts(placed, entries):
     return [
         replace(one, surface=out[one.front or one.name]) if isinstance(one.surface, Mesh) else one for one in placed
     ]
+
+
+def finest_cell(area, scale):
+    """Side [m] of the finest cells of the map of a mesh of `area` [m2] in a scene whose largest side is `scale` [m]."""
+    return min(FINEST * scale, float(np.sqrt(area)) / MOST_CELLS)
 
 
 def assemble(placed, notes, table, up):

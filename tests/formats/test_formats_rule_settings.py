@@ -103,3 +103,4 @@ def test_chunks_follow_the_scene_and_not_the_tolerance():
     for tolerance in (0.002, 0.009, 0.013, 0.1):
         assert n_chunks(settings(bake__tolerance=tolerance), 200) == n_chunks(plain, 200)
     assert n_chunks(settings(bake__chunks=7), 1) == 7
+    assert 1 < n_chunks(plain, 1, 3_000_000) < n_chunks(plain, 1, 30_000_000)
