@@ -5,17 +5,26 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 
+def places(S):
+    """Number of the position (k,) int64 of points S (k, 3): equal bit for bit, but for the sign of zero."""
+    S = np.ascontiguousarray(np.asarray(S, dtype=np.float64) + 0.0)
+    order = np.lexsort(S.T)
+    is_new = np.concatenate([[False], (S[order[1:]] != S[order[:-1]]).any(axis=1)])[: len(S)]
+    out = np.empty(len(S), dtype=np.int64)
+    out[order] = np.cumsum(is_new)
+    return out
+
+
 def in_closed_shell(V, F):
     """(n_f,) bool: the face is part of a closed shell.
 
     V (n_v, 3), F (n_f, 3): positions equal bit for bit are one vertex (0.0 and -0.0 are equal).  Faces that share an
     edge are of one component; a component is closed when each of its edges is used exactly once in each direction.
     """
-    V, F = np.asarray(V, dtype=np.float64) + 0.0, np.asarray(F, dtype=np.int64)
+    F = np.asarray(F, dtype=np.int64)
     if not len(F):
         return np.zeros(0, dtype=bool)
-    _, place = np.unique(np.ascontiguousarray(V).view("V24").ravel(), return_inverse=True)
-    ends = place[F]
+    ends = places(V)[F]
     a, b = ends.ravel(), np.roll(ends, -1, axis=1).ravel()
     face = np.repeat(np.arange(len(F)), 3)
     key = np.minimum(a, b) * len(V) + np.maximum(a, b)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lib.surfaces.closed import places
 from lib.surfaces.loops import following
 
 SHAPE = 0.15  # of an edge's length: points that stand out by more are kept, so that arcs and rings stay recognisable
@@ -68,16 +69,6 @@ def borders(surfaces):
     cap = np.full(place.max(initial=-1) + 1, np.inf)
     np.minimum.at(cap, place, SHAPE * length[edge])
     return Borders(start, place, edge, after, significance, cap)
-
-
-def places(S):
-    """Number of the position (k,) int64 of points S (k, 3): equal bit for bit, but for the sign of zero."""
-    S = np.ascontiguousarray(np.asarray(S, dtype=np.float64) + 0.0)
-    order = np.lexsort(S.T)
-    is_new = np.concatenate([[False], (S[order[1:]] != S[order[:-1]]).any(axis=1)])[: len(S)]
-    out = np.empty(len(S), dtype=np.int64)
-    out[order] = np.cumsum(is_new)
-    return out
 
 
 def _edges(significance, loops, n):
