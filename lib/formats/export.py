@@ -13,6 +13,7 @@ import numpy as np
 
 from lib.formats import gltf, pictures
 from lib.maps import display, estimate, gouraud
+from lib.surfaces.mesh import Mesh
 
 FAR = 100  # a scene farther from the origin than this many of its sizes is exported around its own centre: float32
 GREY = (0.5, 0.5, 0.5)  # reflectance of what has none stated
@@ -52,7 +53,9 @@ def looks(x, shapes, maps, rho_avg, exposure, reconstruction, levels, results):
         light = display.picture(maps.final.map(k), maps.final.hidden_map(k), maps.E[k], exposure)
         if (light == light[0, 0]).all():
             out.append(Look(gltf.Material(name, colour=_clipped(light[0, 0]))))
-        elif _in_vertices(reconstruction.get(name, "auto"), light, [level.UV[_vertices(level, s)] for level in levels]):
+        elif not isinstance(x.surfaces[s], Mesh) and _in_vertices(
+            reconstruction.get(name, "auto"), light, [level.UV[_vertices(level, s)] for level in levels]
+        ):
             out.append(Look(gltf.Material(name), in_vertices=partial(_from_map, light)))
         else:
             uri = f"textures/{x.files[s]}.png"

@@ -10,7 +10,7 @@ from lib.radiosity.quality import quality
 
 RAYS_A_JOB = 12e6  # about 4 s of one core
 MOST_CHUNKS = 64
-MESH_RAYS = 12  # a finest cell of a mesh's map: a fifth of them is sampled
+MESH_RAYS = 8  # a finest cell of a mesh's map: some are sampled whatever the light
 SHADOW_RAYS = 24  # a sample, of a few lights in view
 GATHER_RAYS = 0.1  # of a sample, an element of the coarse solution: roughly what a tolerance asks for with as many
 MOST_WARNINGS = 100  # told the report

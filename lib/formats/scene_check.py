@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lib.elements.lattice import MOST_ROOTS, roots_of
 from lib.formats import artefact, geometry_file, pictures, scene, scene_import, scene_model, scene_table, settings
-from lib.formats.mistakes import Mistakes
+from lib.formats.mistakes import Mistakes, listed
 from lib.maps.base_texture import rho_average
 from lib.maps.budget import gpu_bytes, smallest_total
 from lib.refusal import Refusal
@@ -46,6 +46,9 @@ def run(folder, overrides=None, pictures_folder=None):
     scene.check(made, source.file)
     keep_pictures(model.pictures, pictures_folder)
     warnings = list(made.warnings)
+    asked = [n for n, s in zip(made.names, made.surfaces, strict=True) if isinstance(s, Mesh) and _is_gouraud(table[n])]
+    if asked:
+        warnings.append(f"reconstruction: light in vertices is not for meshes; textures instead: {listed(asked)}")
     textures, rho_avg = _reflectances(source, wanted, made, pictures_folder, warnings)
     digests = {name: geometry_file.digest(source.folder / name) for name in _geometry_files(wanted, source.folder)}
     pictures_used = {row["file"]: geometry_file.digest(row["file"]) for row in textures.values()}
@@ -116,6 +119,10 @@ def _geometry_files(wanted, folder):
     named = {entry["file"] for entry in wanted["geometry"] if "file" in entry}
     beside = {str(Path(name).parent / other) for name in named for other in geometry_file.companions(folder / name)}
     return sorted(named | beside)
+
+
+def _is_gouraud(row):
+    return row["reconstruction"] == "gouraud"
 
 
 def keep_pictures(found, folder):

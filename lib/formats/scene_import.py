@@ -31,7 +31,7 @@ SURFACE_KEYS = (
     "is_black",
     "front",
 )  # not how finely it is refined or exported
-FINEST = 1 / 1024  # of the scene's largest side: finest cell of a mesh's map
+FINEST = 1 / 640  # of the scene's largest side: finest cell of a mesh's map
 MOST_CELLS = 64  # across a small mesh
 NO_LIGHT = (
     "no surface emits light, every map will be black. Add to scene.yaml the line `light: studio` for a soft lamp"

@@ -19,7 +19,8 @@ def in_closed_shell(V, F):
     """(n_f,) bool: the face is part of a closed shell.
 
     V (n_v, 3), F (n_f, 3): positions equal bit for bit are one vertex (0.0 and -0.0 are equal).  Faces that share an
-    edge are of one component; a component is closed when each of its edges is used exactly once in each direction.
+    edge are of one component; a component is closed when each of its edges is used as often in one direction as in the
+    other: bodies that touch along an edge stay closed.
     """
     F = np.asarray(F, dtype=np.int64)
     if not len(F):
@@ -30,7 +31,7 @@ def in_closed_shell(V, F):
     key = np.minimum(a, b) * len(V) + np.maximum(a, b)
     _, edge, uses = np.unique(key, return_inverse=True, return_counts=True)
     turns = np.bincount(edge, weights=np.sign(b - a), minlength=len(uses))
-    is_sound = (uses == 2) & (turns == 0)
+    is_sound = turns == 0
     # faces and edges are the nodes; an edge joins all faces that use it
     size = len(F) + len(uses)
     graph = coo_array((np.ones(len(edge), dtype=np.int8), (face, len(F) + edge)), shape=(size, size))

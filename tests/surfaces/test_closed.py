@@ -43,9 +43,11 @@ def test_cubes_that_share_a_corner_alone_stay_two():
     assert in_closed_shell(V, np.concatenate([CUBE, CUBE[1:] + 8])).tolist() == [True] * 12 + [False] * 11
 
 
-def test_cubes_that_share_an_edge_use_it_four_times():
+def test_cubes_that_share_an_edge_stay_closed():
+    """It is used four times, twice in each direction."""
     V = np.concatenate([CORNERS, CORNERS + [1, 1, 0]])
-    assert not in_closed_shell(V, np.concatenate([CUBE, CUBE + 8])).any()
+    assert in_closed_shell(V, np.concatenate([CUBE, CUBE + 8])).all()
+    assert not in_closed_shell(V, np.concatenate([CUBE, CUBE[1:] + 8])).any()
 
 
 def test_a_t_junction_is_no_joint():
