@@ -21,7 +21,7 @@ from lib.maps import base_texture
 from lib.maps.fill import one_deep
 from lib.maps.mapset import pack, side_lengths
 from lib.refusal import Refusal
-from lib.surfaces.measure import collapsed_sides, is_closed
+from lib.surfaces.measure import collapsed_sides, is_closed, map_domain
 
 
 def arguments(parser):
@@ -172,7 +172,7 @@ def write_map(path, B, hidden, name, surface, rho_avg):
             "unit": "W/m^2",
             "quantity": "reflected radiosity B without base texture",
             "convention": "texel (i, j) is the sample at u = i/(W-1), v = j/(H-1); first row is v = 0",
-            "uv_domain": (0, 1, 0, 1),
+            "uv_domain": map_domain(surface),
             "rho_avg": tuple(rho_avg),
         },
     )

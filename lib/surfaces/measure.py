@@ -154,6 +154,11 @@ def _plane(P):
     return middle, np.linalg.eigh(np.cov((P - middle).T))[1][:, 0]
 
 
+def map_domain(surface):
+    """(u0, u1, v0, v1) that the map of a surface covers, in the whole surface's [0, 1] x [0, 1]: a trimmed one's box."""
+    return tuple(float(x) for x in surface.box) if isinstance(surface, TrimmedSurface) else (0.0, 1.0, 0.0, 1.0)
+
+
 def hull(surface):
     """Points (k, 3) whose convex hull holds the surface: control points and border, or vertices."""
     if isinstance(surface, Mesh):

@@ -141,3 +141,10 @@ def test_points_and_hull_reach_as_far_as_the_surface():
     assert measure.points(cap)[:, 2].max() == pytest.approx(1) and measure.points(cap)[:, 2].min() > -1e-12
     for surface in (cap, sphere(), triangles(np.eye(3), [[0, 1, 2]])):
         assert (measure.hull(surface).max(axis=0) >= measure.points(surface).max(axis=0) - 1e-12).all()
+
+
+def test_a_map_covers_the_box_of_a_trim_and_all_of_other_surfaces():
+    trim = plate(is_hole=False)
+    cropped = type(trim)(trim.base, np.array([0.25, 0.75, 0.5, 1.0]), *list(vars(trim).values())[2:])
+    assert measure.map_domain(cropped) == (0.25, 0.75, 0.5, 1.0)
+    assert measure.map_domain(sphere()) == (0.0, 1.0, 0.0, 1.0)
