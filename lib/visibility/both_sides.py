@@ -62,15 +62,21 @@ def side_light(V, F, face_surface, E, rho, candidates, seed=0):
 
 
 def is_two_sided(light, least=DARK):
-    """(n,) bool: surfaces with light on both sides, of `light` (n, 2) by side_light.
+    """(n,) bool: surfaces with light on both sides, of `light` (n, 2) by side_light."""
+    return is_lit(light, least).all(axis=1)
+
+
+def is_lit(light, least=DARK):
+    """(n, 2) bool: the sides that have light, of `light` (n, 2) by side_light.
 
     A side counts as dark if it gets less than `least` of what the other side gets, and also less than `least` of what
     sheets usually get: the median of the brighter sides.  So a sheet in a dim room keeps both sides beside a bright
     scene, and a lampshade keeps its outside.
     """
-    dark, bright = np.min(light, axis=1), np.max(light, axis=1)
+    light = np.asarray(light, dtype=np.float64)
+    bright = np.max(light, axis=1, keepdims=True)
     usual = np.median(bright[bright > 0]) if (bright > 0).any() else 0.0
-    return (dark > 0) & (dark >= least * np.minimum(bright, usual))
+    return (light > 0) & (light >= least * np.minimum(bright, usual))
 
 
 @dataclass(frozen=True)
