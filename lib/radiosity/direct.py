@@ -17,7 +17,7 @@ from lib.visibility.qmc import r2
 
 DIM = 1e-3  # emitters that together add less than this share of the light found at a sample count as unblocked
 NOISE = 0.7  # standard error of the visible share over sqrt(V (1 - V)) n^-0.75, for n points of an additive recurrence
-BATCH = 4096  # samples at once
+BATCH, PAIRS = 4096, 1 << 21  # samples at once, and pairs of these and facets of emitters
 
 
 @dataclass(frozen=True)
@@ -48,8 +48,9 @@ def direct_light(x, N, shift, emitters, n_groups, tracer, face_surface, n0, n1):
     noise = np.zeros(n)
     counts = np.zeros(3, dtype=np.int64)
     points = r2(n1)
-    for first in range(0, n if L else 0, BATCH):
-        part = slice(first, first + BATCH)
+    at_once = min(BATCH, max(1, PAIRS // max(len(emitters.facets.area), 1)))
+    for first in range(0, n if L else 0, at_once):
+        part = slice(first, first + at_once)
         H[part], noise[part], spared = _batch(
             x[part], N[part], shift[part], points, emitters, n_groups, tracer, face_surface, n0
         )

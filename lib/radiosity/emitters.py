@@ -17,6 +17,7 @@ FLATNESS = 0.01  # chord error of the facets, as a share of the size of the line
 MEAN_HEIGHT = 2 / 3  # of a paraboloid above the chords of a small cell, in units of its height above the cell's middle
 HOLLOW = 1e-6  # least such height, as a share of the emitter's size
 MOST_CELLS = 16  # along one direction
+ENOUGH, LEAST = 2048, 8  # facets of all emitters that are known by their triangles, and of each of them
 
 
 @dataclass(frozen=True)
@@ -105,6 +106,40 @@ def facets_of_triangles(corners, area):
     weight = np.full(own.shape, area / max(own.sum(), 1e-300))
     triangle = np.ones(own.shape, dtype=bool)
     return Facets(a[keep], (b - a)[keep], (c - a)[keep], triangle, cross[keep] / length[keep, None], own, weight)
+
+
+def simplified(triangles):
+    """Fewer triangles for emitters that are known by theirs, ENOUGH for all: a faint glow on a whole model must not
+    cost more than its lamps.
+
+    triangles : list of (V (n, 3), F (k, 3));  returns a list of the same kind.  Corners that lie in one cell of a grid
+    move to their mean; what is left without an area is dropped  [rossignac1993].
+    """
+    if sum(len(F) for _, F in triangles) <= ENOUGH:
+        return triangles
+    size = np.array([np.sqrt(_double_areas(V, F).sum() / 2) for V, F in triangles])
+    most = np.maximum(ENOUGH * size / max(size.sum(), 1e-300), LEAST)
+    return [_clustered(V, F, n) if len(F) > n else (V, F) for (V, F), n in zip(triangles, most, strict=True)]
+
+
+def _clustered(V, F, n):
+    """About n of the triangles F (k, 3) of V; all of them where nothing would be left."""
+    double = _double_areas(V, F)
+    used, corner = np.unique(F, return_inverse=True)
+    cell = np.sqrt(double.sum() / n)  # two triangles to a cell
+    at = np.floor((V[used] - V[used].min(axis=0)) / cell).astype(np.int64)
+    _, cluster, count = np.unique(at, axis=0, return_inverse=True, return_counts=True)
+    cluster = cluster.ravel()
+    mean = np.stack([np.bincount(cluster, V[used, k]) for k in range(3)], axis=1) / count[:, None]
+    few = cluster[corner].reshape(-1, 3)
+    first = np.argmin(few, axis=1)[:, None]
+    few = np.unique(np.take_along_axis(few, (first + np.arange(3)) % 3, axis=1), axis=0)
+    few = few[_double_areas(mean, few) > 1e-3 * double.sum() / n]
+    return (mean, few) if len(few) else (V, F)
+
+
+def _double_areas(V, F):
+    return np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1)
 
 
 def _cell_corners(S):

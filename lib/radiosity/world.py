@@ -13,7 +13,7 @@ from lib.elements.lattice import Lattice, roots_of
 from lib.nurbs.coincident import back_to_back
 from lib.nurbs.evaluate import frame_grid
 from lib.nurbs.surface import NurbsSurface
-from lib.radiosity.emitters import facets_of_triangles, gather_emitters
+from lib.radiosity.emitters import facets_of_triangles, gather_emitters, simplified
 from lib.surfaces.frames import domain_of, whole
 from lib.surfaces.measure import transformed
 from lib.surfaces.mesh import Mesh
@@ -116,19 +116,22 @@ class World:
     @cached_property
     def emitters(self):
         """All emitters, in the scene's frame; cast_only ones shine too."""
-        lit = np.asarray(self.scene.E).max(axis=1, initial=0.0) > 0
-        surfaces = [self._emitting(s) if lit[s] else None for s in range(self.n)]
+        lit = np.flatnonzero(np.asarray(self.scene.E).max(axis=1, initial=0.0) > 0)
+        surfaces = [None] * self.n
+        for s in lit:
+            if isinstance(self.scene.surfaces[s], NurbsSurface):  # exactly
+                surfaces[s] = self.surface(s)
+        others = [s for s in lit if surfaces[s] is None]
+        for s, (V, F) in zip(others, simplified([self._triangles(s) for s in others]), strict=True):
+            surfaces[s] = facets_of_triangles(tuple(V[F[:, k]] for k in range(3)), float(self.casters.area[s]))
         found = gather_emitters(surfaces, self.scene.flip, self.scene.E, self.scene.group)
         return replace(found, is_curved=found.is_curved | self._is_back_to_back[found.surface])
 
-    def _emitting(self, s):
-        """Surface s as gather_emitters takes it: whole NURBS exactly, of others the triangles that cast shadows."""
-        if isinstance(self.scene.surfaces[s], NurbsSurface):
-            return self.surface(s)
+    def _triangles(self, s):
+        """(V, F) of the triangles of surface s that cast shadows, round its lit side."""
         c, front = self.casters, int(self.scene.front[s])
         F = c.F[c.face_surface == (s if front < 0 else front)]
-        F = F if front < 0 else F[:, ::-1]
-        return facets_of_triangles(tuple(c.V[F[:, k]] for k in range(3)), float(c.area[s]))
+        return c.V, F if front < 0 else F[:, ::-1]
 
     @cached_property
     def tracer(self):

@@ -5,7 +5,8 @@ import pytest
 
 from lib.nurbs.shape import area, transformed
 from lib.nurbs.surface import bilinear
-from lib.radiosity.emitters import facets_of, gather_emitters
+from lib.radiosity.emitters import ENOUGH, facets_of, facets_of_triangles, gather_emitters, simplified
+from lib.radiosity.form_factors import form_factor_facets
 from tests.shapes import cylinder, disc, extruded, rectangle, sphere, triangle
 from tests.tolerances import EXACT
 
@@ -97,3 +98,34 @@ def test_the_emitters_of_a_scene():
 def test_no_emitters():
     none = gather_emitters([None], np.zeros(1, bool), np.zeros((1, 3)), np.zeros(1, int))
     assert len(none.E) == 0 and none.first.tolist() == [0] and none.facets.corners().shape == (0, 4, 3)
+
+
+def test_many_triangles_become_few_with_the_same_light():
+    """A glowing sphere of 20,000 triangles: the light of the exact one, from ENOUGH facets."""
+    angle = np.linspace(0, np.pi, 101)
+    ring = np.linspace(0, 2 * np.pi, 101)[:-1]
+    V = np.stack(
+        [
+            np.outer(np.sin(angle), np.cos(ring)).ravel(),
+            np.outer(np.sin(angle), np.sin(ring)).ravel(),
+            np.repeat(np.cos(angle), len(ring)),
+        ],
+        axis=1,
+    )
+    j, i = (k.ravel() for k in np.meshgrid(np.arange(100), np.arange(100), indexing="ij"))
+    a, b = j * 100 + i, j * 100 + (i + 1) % 100
+    F = np.concatenate([np.stack([a, a + 100, b + 100], axis=1), np.stack([a, b + 100, b], axis=1)])
+    ((P, few),) = simplified([(V, F)])
+    assert ENOUGH / 2 < len(few) <= 1.5 * ENOUGH
+    facets = facets_of_triangles(tuple(P[few[:, k]] for k in range(3)), 4 * np.pi)
+    assert facets.weight @ facets.area == pytest.approx(4 * np.pi, rel=1e-9)
+    x = np.array([[3.0, 0, 0], [0, -1.5, 0], [0, 0, 2], [1.2, 1.2, 1.2]])
+    r = np.linalg.norm(x, axis=1)
+    F = form_factor_facets(x, -x / r[:, None], facets) @ facets.weight
+    assert F == pytest.approx(1 / r**2, rel=0.02)
+
+
+def test_few_triangles_stay():
+    V, F = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), np.array([[0, 1, 2]])
+    ((P, same),) = simplified([(V, F)])
+    assert P is V and same is F
