@@ -1,12 +1,17 @@
-"""Form factors from a point to flat facets: the disc for far ones, the exact polygon for near ones.
+"""Form factors from a point to flat facets: the exact polygon for near ones, Gauss points farther off, the disc for far
+ones.
 
-Disc: Wallace et al. 1989.  Polygon: Lambert's formula, Baum et al. 1989, clipped to the receiver's horizon.
-The disc is within 1 % only from r = 8 sqrt(A) on, and no subdivision into discs mends that nearby.
+Polygon: Lambert's formula, Baum et al. 1989, clipped to the receiver's horizon.  Disc: Wallace et al. 1989.
+The disc's area below the fraction line is right on its axis alone: elsewhere it takes A / (pi r^2) away, 0.5 % at
+r = 8 sqrt(A), and no subdivision into discs mends that nearby.  All lamps of a room seen aside are too dim by that,
+so discs begin where it is small, and the kernel is summed over Gauss points between.
 """
 
 import numpy as np
 
-FAR = 8.0  # in units of sqrt(A)
+NEAR, FAR = 8.0, 40.0  # polygons up to, discs from, in units of a facet's longer side: 0.02 % from there on
+GAUSS_SQUARE = np.array([(a, b) for a in (-1, 1) for b in (-1, 1)]) / np.sqrt(12) + 0.5  # degree 3
+GAUSS_TRIANGLE = np.array([(1, 1), (4, 1), (1, 4)]) / 6  # degree 2
 NO_EDGE = 1e-30  # |v_k x v_k+1| below this: the edge is a point or seen end-on
 
 
@@ -16,11 +21,15 @@ def form_factor_disc(D, n, n_facet, area):
     D (..., 3), n and n_facet broadcastable unit normals of receiver and facet, area (...): returns (...), 0 where
     either looks away.
     """
+    return area * _kernel(D, n, n_facet, area)
+
+
+def _kernel(D, n, n_facet, area):
     r2 = np.einsum("...c,...c->...", D, D)
     cos_x = np.einsum("...c,...c->...", D, n)
     cos_y = -np.einsum("...c,...c->...", D, n_facet)
     facing = (cos_x > 0) & (cos_y > 0)
-    return np.where(facing, area * cos_x * cos_y / np.maximum(r2 * (np.pi * r2 + area), NO_EDGE), 0.0)
+    return np.where(facing, cos_x * cos_y / np.maximum(r2 * (np.pi * r2 + area), NO_EDGE), 0.0)
 
 
 def form_factor_polygon(vertices, n):
@@ -57,6 +66,20 @@ def _edge(a, b, n):
     return np.where(length > NO_EDGE, projected, 0.0)
 
 
+def form_factor_gauss(x, n, facets, column):
+    """F from points x, n (m, 3) to one facet each, column (m,): the bare kernel at Gauss points.  (m,)."""
+    F = np.zeros(len(x))
+    for points, rows in (
+        (GAUSS_SQUARE, np.flatnonzero(~facets.is_triangle[column])),
+        (GAUSS_TRIANGLE, np.flatnonzero(facets.is_triangle[column])),
+    ):
+        k = column[rows]
+        D, normal = facets.origin[k] - x[rows], facets.normal[k]
+        for a, b in points if len(rows) else ():
+            F[rows] += _kernel(D + a * facets.e1[k] + b * facets.e2[k], n[rows], normal, 0.0) / len(points)
+    return F * facets.area[column]
+
+
 def form_factor_facets(x, n, facets):
     """F from points to all facets, horizon and facing respected, visibility not.
 
@@ -64,8 +87,14 @@ def form_factor_facets(x, n, facets):
     """
     D = facets.centre[None] - x[:, None]
     F = form_factor_disc(D, n[:, None], facets.normal[None], facets.area[None])
-    behind = np.einsum("mkc,kc->mk", D, facets.normal) >= 0
-    near = np.einsum("mkc,mkc->mk", D, D) < FAR**2 * facets.area
-    row, column = np.nonzero(near & ~behind)
+    ahead = np.einsum("mkc,kc->mk", D, facets.normal) < 0
+    side = np.maximum((facets.e1**2).sum(axis=1), (facets.e2**2).sum(axis=1))
+    r2 = np.einsum("mkc,mkc->mk", D, D)
+    # What may reach below the horizon is cut there, as far off as it matters.
+    cut = np.einsum("mkc,mc->mk", D, n) ** 2 < side
+    is_polygon = ahead & (r2 < np.where(cut, FAR, NEAR) ** 2 * side)
+    row, column = np.nonzero(is_polygon)
     F[row, column] = form_factor_polygon(facets.corners()[column] - x[row, None], n[row])
+    row, column = np.nonzero(ahead & ~is_polygon & ~cut & (r2 < FAR**2 * side) & (F > 0))
+    F[row, column] = form_factor_gauss(x[row], n[row], facets, column)
     return F

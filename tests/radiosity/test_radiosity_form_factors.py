@@ -140,21 +140,41 @@ def test_a_point_on_the_polygon_is_finite(place):
         assert 0 <= polygon(SQUARE, n, place) <= 1
 
 
-@pytest.mark.parametrize("facing", [[0, 0, -1], [1, 0, 0]])
-@pytest.mark.parametrize("least, bound", [(FAR, 0.016), (10, 0.01)])
-def test_disc_is_the_polygon_from_afar(facing, least, bound):
-    """In any direction, grazing ones too, within 1.6 % from FAR on and within 1 % from 10 on."""
+def around(facing, least, most, n=3000):
+    """Points from which the unit square that looks along `facing` lies at D, wholly above the horizon: (D, corners)."""
     rng = np.random.default_rng(4)
-    direction = rng.normal(size=(3000, 3))
+    direction = rng.normal(size=(n, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
-    D = direction * rng.uniform(least, 3 * least, (3000, 1))
+    D = direction * rng.uniform(least, most, (n, 1))
     flat = SQUARE - [0.5, 0.5, 0]
     if facing[0]:
         flat, D[:, 0] = flat[:, [2, 0, 1]], -np.abs(D[:, 0])
     above = ((D[:, None] + flat)[..., 2].min(axis=1) > 0) & (np.abs(direction @ facing) > 0.05)
-    disc = form_factor_disc(D, UP, np.array([facing], float), 1.0)[above]
-    exact = form_factor_polygon(D[:, None] + flat, np.repeat(UP, len(D), axis=0))[above]
-    assert above.sum() > 500 and np.abs(disc / exact - 1).max() < bound
+    return D[above], flat
+
+
+@pytest.mark.parametrize("facing", [[0, 0, -1], [1, 0, 0]])
+def test_disc_is_the_polygon_from_afar(facing):
+    """In any direction, grazing ones too."""
+    D, flat = around(facing, FAR, 3 * FAR)
+    disc = form_factor_disc(D, UP, np.array([facing], float), 1.0)
+    exact = form_factor_polygon(D[:, None] + flat, np.repeat(UP, len(D), axis=0))
+    assert len(D) > 500 and np.abs(disc / exact - 1).max() < 1e-3
+
+
+@pytest.mark.parametrize("is_triangle", [False, True])
+@pytest.mark.parametrize("facing", [[0, 0, -1], [1, 0, 0]])
+def test_no_distance_is_less_exact(facing, is_triangle):
+    """The polygon's value at all distances and in all directions: discs alone are 0.5 % low at 8, seen aside."""
+    D, flat = around(facing, 2.0, 100.0)
+    facets = Facets(
+        flat[:1], flat[1:2] - flat[0], flat[3:] - flat[0], np.array([is_triangle]), np.array([facing], float),
+        np.array([0.5 if is_triangle else 1.0]), np.ones(1),
+    )  # fmt: skip
+    N = np.repeat(UP, len(D), axis=0)
+    exact = form_factor_polygon(D[:, None] + facets.corners()[0], N)
+    ratio = form_factor_facets(-D, N, facets)[:, 0] / exact
+    assert abs(ratio.mean() - 1) < 2e-4 and np.abs(ratio - 1).max() < 3e-3
 
 
 def test_disc_on_its_axis():
