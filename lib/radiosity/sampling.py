@@ -16,7 +16,8 @@ from lib.surfaces.frames import frame, whole
 from lib.visibility.hidden import are_buried
 from lib.visibility.qmc import shift, stream
 
-FEW_RAYS = (16, 16)  # to a lamp from one of an element's 16 points
+FEW_RAYS = (4, 4)  # to a lamp from one of an element's 16 points
+ROUGH = 0.2  # contrast of a cell's corners from which its elements get shadow rays of their own
 
 
 @dataclass(frozen=True)
@@ -128,18 +129,17 @@ def surface_elements(world, s, seed, grids, R, base):
     rows = without(rows, ~found.keeps & ~rows.is_hidden)
     visible = ~rows.is_hidden
     area = (by_element(on.density) * visible).mean(axis=1) / (n_u * n_v)
-    value, hidden, _, level = base
-    light = _bilinear(value, hidden, u, v)
-    beside = _beside_walls(is_walled, hidden.shape)
+    value, hidden, noise, level = base
     cover = world.cover(s, level)
-    if cover is not None:
-        beside |= cover[1][_cells_of(v, hidden.shape[0])][:, _cells_of(u, hidden.shape[1])]
-    beside &= on.is_part
-    if beside.any():  # between samples of two rooms, or of two charts, nothing can be interpolated
+    light = _bilinear(*(finer(value, hidden) if cover is None else (value, hidden)), u, v)
+    cells = is_rough(value, hidden, noise) | _walled_cells(is_walled, hidden.shape)
+    cells |= cover[1] if cover is not None else False
+    own = cells[_cells_of(v, hidden.shape[0])][:, _cells_of(u, hidden.shape[1])] & on.is_part
+    if own.any():  # between samples in light and shadow, of two rooms, or of two charts, nothing can be interpolated
         key = stream(f"{seed} elements", world.scene.names[s])
-        j, i = np.nonzero(beside)
-        points = Points(np.full(len(j), s), None, None, lifted[beside], on.N[beside], shift(key, i, j))
-        light[beside] = direct_at(world, points, FEW_RAYS)[0].H.reshape(len(j), -1)
+        j, i = np.nonzero(own)
+        points = Points(np.full(len(j), s), None, None, lifted[own], on.N[own], shift(key, i, j))
+        light[own] = direct_at(world, points, FEW_RAYS)[0].H.reshape(len(j), -1)
     light = by_element(light)
     count = np.maximum(visible.sum(axis=1), 1)[:, None]
     is_alone = found.is_alone | _between_charts(by_element(on.chart), outside, n_u, n_v)
@@ -217,8 +217,17 @@ def _by_point(array, n_u, n_v):
     return array.reshape(n_v, n_u, POINTS, POINTS).swapaxes(1, 2).reshape(n_v * POINTS, n_u * POINTS)
 
 
-def _beside_walls(blocked, shape):
-    """(4 n_v, 4 n_u) bool: points in cells of the base lattice (h, w) in which a link between points is blocked."""
+def is_rough(value, hidden, noise):
+    """Cells (h - 1, w - 1) of a lattice in which light is not smooth: corners hidden, in penumbra, or far apart."""
+    light = value.max(axis=2, initial=0.0)
+    corners = np.stack([light[:-1, :-1], light[:-1, 1:], light[1:, :-1], light[1:, 1:]])
+    doubt = (noise > 0) | hidden
+    doubt = doubt[:-1, :-1] | doubt[:-1, 1:] | doubt[1:, :-1] | doubt[1:, 1:]
+    return doubt | (np.ptp(corners, axis=0) > ROUGH * corners.max(axis=0))
+
+
+def _walled_cells(blocked, shape):
+    """Cells of the base lattice (h, w) in which a link between points is blocked."""
     blocked_u, blocked_v = blocked
     rows, columns = blocked_u.shape[0], blocked_v.shape[1]
     walled = np.zeros((rows, columns), dtype=bool)
@@ -228,12 +237,36 @@ def _beside_walls(blocked, shape):
     ):
         walled[first] |= link
         walled[last] |= link
-    cell_j = _cells_of((np.arange(rows) + 0.5) / rows, shape[0])
-    cell_i = _cells_of((np.arange(columns) + 0.5) / columns, shape[1])
     cells = np.zeros((shape[0] - 1, shape[1] - 1), dtype=bool)
     j, i = np.nonzero(walled)
-    cells[cell_j[j], cell_i[i]] = True
-    return cells[cell_j][:, cell_i]
+    cells[_cells_of((j + 0.5) / rows, shape[0]), _cells_of((i + 0.5) / columns, shape[1])] = True
+    return cells
+
+
+def finer(value, hidden):
+    """Lattice values (h, w, C), hidden (h, w) on the lattice twice as fine, bent as their neighbours say.
+
+    Straight lines cut through every crest, and light is all crests below lamps: the elements would get 0.3 % less than
+    was sent.  A midpoint lies above its ends' mean by an eighth of the lesser of the second differences there, where
+    both bend the same way: exact on parabolas, straight across shadow edges, and never light between two dark ends.
+    """
+    for axis in (0, 1):
+        value, hidden = np.swapaxes(value, 0, axis), np.swapaxes(hidden, 0, axis)
+        bend = np.zeros_like(value)
+        bend[1:-1] = value[2:] - 2 * value[1:-1] + value[:-2]
+        bend[1:-1][hidden[2:] | hidden[1:-1] | hidden[:-2]] = 0
+        bend[0], bend[-1] = bend[1], bend[-2]
+        a, b = bend[:-1], bend[1:]
+        least = np.where(a * b > 0, np.sign(a) * np.minimum(np.abs(a), np.abs(b)), 0)
+        seen = (~hidden).astype(value.dtype)[..., None]
+        weight = seen[1:] + seen[:-1]
+        mean = (value[1:] * seen[1:] + value[:-1] * seen[:-1]) / np.maximum(weight, 1)
+        fine = np.empty((2 * len(value) - 1, *value.shape[1:]), dtype=value.dtype)
+        shade = np.empty(fine.shape[:2], dtype=bool)
+        fine[::2], fine[1::2] = value, np.maximum(mean - least / 8, 0)
+        shade[::2], shade[1::2] = hidden, hidden[1:] & hidden[:-1]
+        value, hidden = np.swapaxes(fine, 0, axis), np.swapaxes(shade, 0, axis)
+    return value, hidden
 
 
 def _bilinear(value, hidden, u, v):
