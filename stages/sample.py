@@ -9,6 +9,7 @@ settings: seed, n_elements, rays_per_element, first_shadow_rays [n0, n1], base_d
 import numpy as np
 
 from lib import door
+from lib.elements.grids import POINTS
 from lib.formats import casters, samples, scene
 from lib.radiosity.sampling import base_lattice, surface_elements
 from lib.radiosity.world import World
@@ -64,7 +65,9 @@ def packed(surfaces, base, lit, elements, grids, groups):
         np.concatenate([np.zeros((0, 16), bool), *(r.is_hidden for r in rows)]),
         np.concatenate([np.zeros(0, bool), *(e.is_alone for e in elements)]),
         np.concatenate([np.zeros(0), *(e.area for e in elements)]),
-        np.concatenate([np.zeros((0, groups, 3)), *(e.H_direct.reshape(-1, groups, 3) for e in elements)]),
+        np.concatenate(
+            [np.zeros((0, POINTS**2, groups, 3)), *(e.H_direct.reshape(-1, POINTS**2, groups, 3) for e in elements)]
+        ).astype(np.float32),
     )
 
 

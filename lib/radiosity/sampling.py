@@ -99,8 +99,8 @@ def base_lattice(world, surfaces, seed, level, shadow_rays):
 
 @dataclass(frozen=True)
 class Elements:
-    """Elements of one surface: rows, is_alone (k,) bool as Parts has it, visible area (k,), mean direct light over
-    visible points H_direct (k, 3 G)."""
+    """Elements of one surface: rows, is_alone (k,) bool as Parts has it, visible area (k,), direct light at their
+    points H_direct (k, 16, 3 G), 0 where hidden."""
 
     rows: Rows
     is_alone: np.ndarray
@@ -140,10 +140,8 @@ def surface_elements(world, s, seed, grids, R, base):
         j, i = np.nonzero(own)
         points = Points(np.full(len(j), s), None, None, lifted[own], on.N[own], shift(key, i, j))
         light[own] = direct_at(world, points, FEW_RAYS)[0].H.reshape(len(j), -1)
-    light = by_element(light)
-    count = np.maximum(visible.sum(axis=1), 1)[:, None]
     is_alone = found.is_alone | _between_charts(by_element(on.chart), outside, n_u, n_v)
-    return Elements(rows, is_alone, area, (light * visible[..., None]).sum(axis=1) / count)
+    return Elements(rows, is_alone, area, by_element(light) * visible[..., None])
 
 
 @dataclass(frozen=True)

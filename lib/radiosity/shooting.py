@@ -55,9 +55,9 @@ class FormFactors:
     def __init__(self, entries):
         n, R = entries.shape
         self.n = n
-        rays = np.maximum((entries != -3).sum(axis=1), 1)
-        row, column = np.nonzero(entries >= 0)
-        target = entries[row, column].astype(np.int64)
+        self._rays = rays = np.maximum((entries != -3).sum(axis=1), 1)
+        self._meeting = row, column = np.nonzero(entries >= 0)
+        self._met = target = entries[row, column].astype(np.int64)
         pair, count = np.unique(row * np.int64(n) + target, return_counts=True)
         self._row, self._column = pair // max(n, 1), pair % max(n, 1)
         self._F = count / rays[self._row]
@@ -68,6 +68,14 @@ class FormFactors:
     def gather(self, B):
         """sum_j F_ij B_j for B (n, C): (n, C)."""
         return self._sum(self._row, self._column, B)
+
+    def gather_points(self, B, met):
+        """What the rays bring of B (n, 16, C), which differs over the 16 points of an element, met (n, R) at which:
+        (n, C).
+        """
+        row, ray = self._meeting
+        sums = [np.bincount(row, c, minlength=self.n) for c in B[self._met, met[row, ray]].T]
+        return np.stack(sums, axis=1) / self._rays[:, None]
 
     def scatter(self, power):
         """sum_i F_ij power_i for power (n, C): (n, C)."""
@@ -83,7 +91,7 @@ class FormFactors:
         return np.stack([np.bincount(to, w, minlength=self.n) for w in weighted.T], axis=1)
 
 
-def solve(H_direct, rho, area, F, residual=1e-3, bounces=None):
+def solve(H_direct, rho, area, F, residual=1e-3, bounces=None, first=None):
     """Irradiance of all elements.
 
     Parameters
@@ -92,32 +100,35 @@ def solve(H_direct, rho, area, F, residual=1e-3, bounces=None):
     F : FormFactors
     residual : stop shooting at this unshot share, and sweeping at this relative change
     bounces : None to converge, or n >= 1 reflections: 1 is direct light alone
+    first : (n, G, 3) the first reflection as gathered from light known finer than by elements; default: by them
 
     Raises DoesNotConverge when light does not die out.
     """
     n, G = H_direct.shape[:2]
     flat = H_direct.reshape(n, G * 3).astype(np.float64)
     rho_flat = np.tile(rho, (1, G)).astype(np.float64)
+    coarse = F.gather(rho_flat * flat)
+    first = coarse if first is None else first.reshape(n, G * 3)
     if bounces is not None:
-        return _reflect(flat, rho_flat, area, F, bounces, G)
+        return _reflect(flat, first, rho_flat, area, F, bounces, G)
     H, dB, history, ledger, shots = _shoot(flat, rho_flat, area, F, residual)
     ambient = _ambient(dB, rho_flat, area, F)
-    H, sweeps = _sweep(flat, H, rho_flat, area, F, residual)
+    H, sweeps = _sweep(flat, flat + (first - coarse), H, rho_flat, area, F, residual)
     gathered, shot = (rho_flat * H * area[:, None]).sum(axis=0), ledger.pop("reflected")
     ledger["residue"] = gathered - shot
     ledger = {name: value.reshape(G, 3) for name, value in ledger.items()}
     return Solution(H.reshape(n, G, 3), ambient.reshape(G, 3), history, ledger, shots, sweeps)
 
 
-def _reflect(H_direct, rho, area, F, bounces, G):
+def _reflect(H_direct, first, rho, area, F, bounces, G):
     """A fixed number of reflections: the final gather is the last but one, so bounces - 2 sweeps from direct light."""
     column = area[:, None]
     received = (H_direct * column).sum(axis=0)
     H, term = H_direct.copy(), H_direct
     absorbed, escaped = ((1 - rho) * term * column).sum(axis=0), np.zeros_like(received)
-    for _ in range(bounces - 2):
+    for bounce in range(bounces - 2):
         escaped += (rho * term * column * (F.escaped + F.absorbed)[:, None]).sum(axis=0)
-        term = F.gather(rho * term)
+        term = F.gather(rho * term) if bounce else first
         absorbed += ((1 - rho) * term * column).sum(axis=0)
         H = H + term
     unshot = (rho * term * column).sum(axis=0)
@@ -183,23 +194,24 @@ def _round_trip(rho, area, F):
     return (F.met * area).sum() / total * (rho * area[:, None]).sum(axis=0) / total
 
 
-def _sweep(H_direct, H, rho, area, F, residual):
-    """Gather until what is to come, summed as a geometric series, is below `residual`, on the mean of all lit elements.
+def _sweep(H_direct, source, H, rho, area, F, residual):
+    """Gather H = source + sum_j F_ij rho_j H_j until what is to come, summed as a geometric series, is below
+    `residual`, on the mean of all lit elements.
 
     Changes count relative to the light of each element: a dim room converges like the bright one beside it.  The first
     of them are the noise of shooting, gone after a few sweeps; light that goes round a room dies slowest, by about the
     mean reflectance a sweep.  So the series is summed with the slowest of that ratio, the last one seen and the one it
     rises to.  After each sweep the light is scaled by what leaves least to change (least squares): (1 + t) H leaves
-    change + t (change - H_direct).  Where it ends stays the same, and what is dark stays dark.
+    change + t (change - source).  Where it ends stays the same, and what is dark stays dark.
     """
     column = area[:, None]
     slow = float(_round_trip(rho, area, F).max(initial=0.0))
-    change = H_direct + F.gather(rho * H) - H
+    change = source + F.gather(rho * H) - H
     previous, before = _relative(change, H), 0.0
     least = previous
     for sweep in range(1, MOST_SWEEPS + 1):
         H, change = H + change, F.gather(rho * change)
-        turn = change - H_direct
+        turn = change - source
         t = -(column * change * turn).sum(axis=0) / np.maximum((column * turn * turn).sum(axis=0), 1e-300)
         H, change = H * (1 + t), change + t * turn
         size = _relative(change, H)

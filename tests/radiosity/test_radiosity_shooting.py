@@ -270,3 +270,28 @@ def test_elements_of_different_size_keep_the_power():
     H_direct = np.array([8.0, 0])[:, None, None] * np.ones(3)
     H, *_ = shooting._shoot(H_direct[:, 0], np.full((2, 3), 1e-9), np.array([1.0, 4]), FormFactors(entries), 1e-3)
     assert H[1, 0] == pytest.approx(1e-9 * 8 / 4, rel=1e-6)
+
+
+def test_light_known_finer_than_by_elements_counts_once_where_it_is_met():
+    """Two plates that see each other; one half of each is lit, and all rays meet the lit halves."""
+    entries, met = np.array([[1, 1, 1, 1], [0, 0, 0, 0]], dtype=np.int32), np.zeros((2, 4), dtype=np.uint8)
+    F, rho = FormFactors(entries), np.full((2, 3), 0.5)
+    points = np.zeros((2, 16, 3))
+    points[:, :8] = 2.0
+    first = F.gather_points(points * 0.5, met)
+    assert first == pytest.approx(np.ones((2, 3)))
+    H_direct = points.mean(axis=1)[:, None]
+    found = solve(H_direct, rho, np.ones(2), F, residual=1e-7, first=first[:, None]).H
+    assert found == pytest.approx(np.full((2, 1, 3), 1 + 1 + 0.5 * 1 / (1 - 0.5)), rel=1e-6)
+    assert solve(H_direct, rho, np.ones(2), F, bounces=3, first=first[:, None]).H == pytest.approx(
+        np.full((2, 1, 3), 2)
+    )
+
+
+def test_no_finer_light_changes_nothing():
+    entries = closed()
+    F, rho, H_direct = FormFactors(entries), np.full((6, 3), 0.5), direct(6, 1)
+    same = F.gather_points(np.repeat((rho * H_direct[:, 0])[:, None], 16, axis=1), np.zeros(entries.shape, np.uint8))
+    assert solve(H_direct, rho, np.ones(6), F, first=same[:, None]).H == pytest.approx(
+        solve(H_direct, rho, np.ones(6), F).H
+    )

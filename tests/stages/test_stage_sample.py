@@ -48,14 +48,14 @@ def test_direct_light_on_the_base_lattice(tmp_path):
 
 
 def test_elements_of_all_surfaces_that_reflect(tmp_path):
-    """Every element once, rows as long as asked, H_direct the light of its cell."""
+    """Every element once, rows as long as asked, H_direct the light at its points."""
     bake, (x,) = sampled(tmp_path, still_life(), rays_per_element=32)
     grids = vars(casters.load(bake.path("casters")))
     assert x.element.tolist() == list(range(len(x.element)))
     assert x.entries.shape == (len(x.element), 32) and x.entries.max() < len(x.element)
     total = grids["area"][[0, 2, 3]].sum()  # floor, tube, wall: the lamp is black
     assert x.area.sum() == pytest.approx(total, rel=1e-3)
-    assert (x.H_direct >= 0).all() and x.H_direct.max() <= x.value.max()
+    assert (x.H_direct >= 0).all() and x.H_direct.max() <= 1.01 * x.value.max()
 
 
 def test_elements_receive_what_was_sent(tmp_path):
@@ -67,7 +67,7 @@ def test_elements_receive_what_was_sent(tmp_path):
     at = np.stack([*np.meshgrid(t, t), np.zeros((200, 200))], axis=-1).reshape(-1, 3)
     corners = np.array([[0.25, 0.25, 1], [0.75, 0.25, 1], [0.75, 0.75, 1], [0.25, 0.75, 1]])
     F = form_factor_polygon(corners - at[:, None], np.tile([0.0, 0, 1], (len(at), 1)))
-    received = (x.H_direct[:, 0] * x.area[:, None]).sum(axis=0) / x.area.sum()
+    received = (x.H_direct.mean(axis=1)[:, 0] * x.area[:, None]).sum(axis=0) / x.area.sum()
     assert received == pytest.approx(F.mean() * np.array([3, 2, 1]), rel=1e-3)
 
 
@@ -110,7 +110,7 @@ def test_same_bytes_again_and_others_for_another_seed(tmp_path):
 def test_more_chunks_than_surfaces(tmp_path):
     _, parts = sampled(tmp_path, {"floor": (FLOOR, {})}, chunks=3)
     assert [len(p.surface) for p in parts] == [1, 0, 0]
-    assert parts[2].value.shape == (0, 3) and parts[2].H_direct.shape == (0, 1, 3)
+    assert parts[2].value.shape == (0, 3) and parts[2].H_direct.shape == (0, 16, 1, 3)
 
 
 def test_one_bounce_casts_no_element_rays(tmp_path):

@@ -136,10 +136,10 @@ def test_arrays_of_other_names_are_refused(tmp_path, capsys):
     """A file of the right kind whose arrays are not those of the contract: written by other code."""
     bake = sampled(tmp_path, lit_room())
     path = bake.path("samples", 0)
-    header, arrays = artefact.read(path, "samples", 2)
+    header, arrays = artefact.read(path, "samples", 3)
     header.pop("kind"), header.pop("version")
     arrays["penumbra"] = arrays.pop("hidden")
-    artefact.write(path, "samples", 2, header, arrays)
+    artefact.write(path, "samples", 3, header, arrays)
     assert bake.shoot() == 1
     assert path in capsys.readouterr().err
 
