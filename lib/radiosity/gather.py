@@ -18,7 +18,7 @@ from lib.elements.grids import POINTS, at_centres
 from lib.elements.lattice import OFFSET
 from lib.visibility.hemisphere import cosine_direction_each, cosine_directions
 from lib.visibility.hidden import is_hidden
-from lib.visibility.qmc import fibonacci, weyl
+from lib.visibility.qmc import fibonacci, path_coordinates
 
 RAYS_AT_ONCE = 16384  # what is gathered stays in the cache
 NEAR = 2.0  # hits nearer than this many element widths are followed on
@@ -163,7 +163,7 @@ class IndirectLight:
 def indirect_light(x, N, shift, K, tracer, mesh, table, channels):
     """Gather at points x (n, 3), lifted, with normals N (n, 3), by K rays each."""
     n = len(x)
-    points, onward = fibonacci(K), weyl(K).astype(np.float32)
+    points = fibonacci(K)
     H = np.zeros((n, channels), dtype=np.float32)
     hidden, noise, reach = np.zeros(n, dtype=bool), np.zeros(n, dtype=np.float32), np.zeros(n, dtype=np.float32)
     step = max(1, RAYS_AT_ONCE // K)
@@ -173,8 +173,8 @@ def indirect_light(x, N, shift, K, tracer, mesh, table, channels):
         D = cosine_directions(N[part], points, shift[part] / (K, 1)).reshape(-1, 3)
         origins = np.repeat(x[part].astype(np.float32), K, axis=0)
         hits = tracer.closest(origins, D)
-        random = ((onward[None] + shift[part, None, ::-1]) % 1.0).reshape(-1, 2)
-        seen = _follow(origins, D, hits, random, tracer, mesh, table, MOST_STEPS).reshape(k, K, channels)
+        ray = np.arange(k * K)
+        seen = _follow(origins, D, hits, ray, K, shift[part], tracer, mesh, table).reshape(k, K, channels)
         H[part] = seen.mean(axis=1)
         all_groups = seen if channels <= 3 else seen.reshape(k, K, -1, 3).sum(axis=2)
         noise[part] = NOISE * all_groups.std(axis=1).max(axis=1) / K**0.8
@@ -184,17 +184,19 @@ def indirect_light(x, N, shift, K, tracer, mesh, table, channels):
     return IndirectLight(H, hidden, noise, reach)
 
 
-def _follow(origins, D, hits, random, tracer, mesh, table, steps):
-    """Radiosity along rays; near hits are followed by one ray each, at most `steps` deep."""
+def _follow(origins, D, hits, ray, K, shift, tracer, mesh, table, step=0):
+    """Radiosity along rays; near hits are followed by one ray each, at most MOST_STEPS deep.
+
+    ray (n,) : number of each, K to a sample, whose shifts (samples, 2) they share.
+    """
     seen = table.all_light(hits)
-    near = np.flatnonzero(table.is_near(hits)) if steps else ()
+    near = np.flatnonzero(table.is_near(hits)) if step < MOST_STEPS else ()
     if len(near):
-        there = hits[near]
+        there, ray = hits[near], ray[near]
         N = mesh.normal[there.face]
         x = (origins[near] + there.t[:, None] * D[near] + N * OFFSET).astype(np.float32)
-        onward = cosine_direction_each(N, random[near])
+        onward = cosine_direction_each(N, path_coordinates(ray % K, shift[ray // K], step + 1))
         beyond = tracer.closest(x, onward)
-        turned = (random[near] + 0.6180339887) % 1.0
-        H = _follow(x, onward, beyond, turned, tracer, mesh, table, steps - 1)
+        H = _follow(x, onward, beyond, ray, K, shift, tracer, mesh, table, step + 1)
         seen[near] = table.direct_light(there) + table.rho(there) * H
     return seen

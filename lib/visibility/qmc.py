@@ -11,6 +11,8 @@ import numpy as np
 R2_STEP = np.array([0.7548776662466927, 0.5698402909980532])  # 1/g, 1/g^2 with g^3 = g + 1
 
 GOLDEN = (np.sqrt(5.0) - 1) / 2
+PATH_STEPS = np.array([(2, 3), (7, 11), (13, 17), (19, 23)])  # square roots that no other coordinate uses
+HASHING = np.array([[(29, 31), (37, 41)], [(43, 47), (53, 59)], [(61, 67), (71, 73)], [(79, 83), (89, 97)]])
 
 
 def r2(n, first=1):
@@ -33,12 +35,15 @@ def fibonacci(n):
     return np.stack([k / n, (k * GOLDEN) % 1.0], axis=1)
 
 
-def weyl(n, first=1):
-    """Points of another additive recurrence, steps sqrt 2 and sqrt 3: the second pair of coordinates of a path beside
-    r2.
+def path_coordinates(k, shift, step):
+    """Coordinates of step 1, 2, ... of path k (m,) beyond its first direction: (m, 2) float64 of [0, 1).
+
+    Additive recurrences with steps of their own, turned by hashes of the sample's shift (m, 2).  Were steps turned by
+    the same number, the second would know the first: what they gather is then wrong, not merely noisy (measured at
+    contacts: 25 % more error).
     """
-    k = np.arange(first, first + n, dtype=np.float64)
-    return (k[:, None] * np.sqrt([2.0, 3.0])) % 1.0
+    turn = shift @ (8191.0 * np.sqrt(HASHING[step - 1])).T
+    return (k[:, None] * np.sqrt(PATH_STEPS[step - 1]) + turn) % 1.0
 
 
 def stream(seed, name):

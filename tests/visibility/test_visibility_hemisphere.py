@@ -6,7 +6,7 @@ import pytest
 from lib.visibility import qmc
 from lib.visibility.hemisphere import cosine_direction_each, cosine_directions, tangent_frames
 from lib.visibility.hidden import is_hidden
-from lib.visibility.qmc import R2_STEP, r2, shift, stream
+from lib.visibility.qmc import R2_STEP, path_coordinates, r2, shift, stream
 from tests.tolerances import EXACT, FLOAT32, STANDARD_ERRORS
 
 NORMALS = np.concatenate([np.eye(3), -np.eye(3), np.random.default_rng(3).normal(size=(40, 3))])
@@ -152,3 +152,14 @@ def test_one_direction_each_is_the_first_of_many():
     points = rng.random((len(N), 2))
     many = cosine_directions(N, np.zeros((1, 2)), points)[:, 0]
     assert np.abs(cosine_direction_each(N, points) - many).max() < 4 * FLOAT32
+
+
+def test_steps_of_a_path_do_not_know_each_other():
+    """Over all turns of a sample every pair of coordinates, the first direction's too, is uniform on the square."""
+    turns = shift(stream(1, "path"), *(a.ravel() for a in np.indices((200, 200))))
+    k = np.full(len(turns), 5)
+    all_of_them = np.concatenate([turns, *(path_coordinates(k, turns, step) for step in (1, 2, 3, 4))], axis=1)
+    for a in range(10):
+        for b in range(a):
+            cells = np.histogram2d(all_of_them[:, a], all_of_them[:, b], bins=8, range=[[0, 1], [0, 1]])[0]
+            assert np.abs(cells - len(turns) / 64).max() < 5 * np.sqrt(len(turns) / 64), (a, b)
