@@ -5,7 +5,7 @@ reads   scene.npz, casters.npz, solution.npz, and chunk_<c>.npz of sample (direc
 writes  direct_<c>.npz or indirect_<c>.npz          (lib.formats.trees)
 
 settings: seed, tolerance, tolerances, relative_to, t_direct, t_indirect, base_indirect, top, gather_rays, shadow_rays,
-bounces
+smallest_cell, bounces
 """
 
 import numpy as np
@@ -39,7 +39,13 @@ def body(args, cost):
     if args.half == "direct":
         x = samples.load(args.samples)
         done, spared = refine_direct(
-            world, unpacked(x, world), chosen["seed"], tau, chosen["top"], chosen["shadow_rays"]
+            world,
+            unpacked(x, world),
+            chosen["seed"],
+            tau,
+            chosen["top"],
+            chosen["shadow_rays"],
+            chosen["smallest_cell"],
         )
         cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))
     elif chosen["bounces"] == 1 or not np.any(solved.mean_H):
@@ -52,7 +58,8 @@ def body(args, cost):
         table = lookup_table(world, direct, solved, follows)
         rays = rays_of_surfaces(gather_rays(chosen["gather_rays"], own), own_light(solved, chosen))
         top, base = chosen["top"], chosen["base_indirect"]
-        done = refine_indirect(world, mine, table, solved, chosen["seed"], tau, top, base, rays)
+        smallest = chosen["smallest_cell"]
+        done = refine_indirect(world, mine, table, solved, chosen["seed"], tau, top, base, rays, smallest)
     trees.save(args.out, args.half, {int(s): stored(t, world.n_groups) for s, t in done.items()}, cost.notes)
     cost.rays = world.tracer.rays
 

@@ -16,7 +16,7 @@ from lib.elements.balance import balance, children, grow
 CONTACT_CELL = 1 / 200  # of the scene's largest side: cells along a contact are divided down to this
 WIDE, WIDE_LEVELS = 1.0, 2  # root-cell widths; levels below the base
 
-SMALLEST_CELL = 1e-3  # of the scene's largest side: finer than anybody sees
+SMALLEST_CELL = 1e-3  # of the scene's largest side: no finer but where asked
 NOISE = 1.0  # standard errors taken off a departure before it counts
 FULL_CELL, SLACK = 1 / 16, 0.5
 
@@ -24,7 +24,7 @@ FULL_CELL, SLACK = 1 / 16, 0.5
 class Quadtree:
     """State of one tree.
 
-    lattice : Lattice; side : length of a root cell in the scene's frame
+    lattice : Lattice; side : length of a root cell in the scene's frame; smallest : cells this large are not divided
     level : of the arrays below, which hold the whole lattice of that level
     value (h, w, C) float32, known, hidden (h, w) bool, noise (h, w) float32 standard error of the sample, 0 if it has
     none,
@@ -35,8 +35,8 @@ class Quadtree:
     map: only needed cells are divided; those that straddle two charts always, down to `finest`, the tree's own top.
     """
 
-    def __init__(self, lattice, base, channels, side=1.0, cover=None, finest=None):
-        self.lattice, self.base, self.level, self.side = lattice, base, base, side
+    def __init__(self, lattice, base, channels, side=1.0, cover=None, finest=None, smallest=SMALLEST_CELL):
+        self.lattice, self.base, self.level, self.side, self.smallest = lattice, base, base, side, smallest
         self._cover, self._finest = cover, finest
         shape = lattice.shape(base)
         self.value = np.zeros((*shape, channels), dtype=np.float32)
@@ -98,7 +98,7 @@ class Quadtree:
         for level in range(self.base, len(divided)):
             cell = self.side * 2.0**-level
             needed, straddling = self._cover(level) if self._cover else (True, False)
-            if cell > SMALLEST_CELL:
+            if cell > self.smallest:
                 slack = max(1.0, (FULL_CELL / cell) ** SLACK)
                 divided[level] |= self._exceeds(level, tau * slack) & self._exists(level) & needed
             divided[level] |= straddling & self._exists(level)

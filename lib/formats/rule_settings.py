@@ -32,7 +32,7 @@ def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None):
         "t_direct": q["t_direct"],
         "t_indirect": q["t_indirect"],
     }
-    refine = {name: q[name] for name in ("top", "gather_rays", "shadow_rays", "base_indirect")}
+    refine = {name: q[name] for name in ("top", "gather_rays", "shadow_rays", "base_indirect", "smallest_cell")}
     sample = {name: q[name] for name in ("n_elements", "rays_per_element", "base_direct", "first_shadow_rays")}
     slices = {
         "tessellate": {"sag": bake["sag"]},

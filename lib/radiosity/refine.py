@@ -5,13 +5,13 @@ from functools import partial
 import numpy as np
 
 from lib.elements.balance import parents
-from lib.elements.quadtree import Quadtree
+from lib.elements.quadtree import SMALLEST_CELL, Quadtree
 from lib.maps.resample import resample
 from lib.radiosity.gather import LookupTable, indirect_light, radiosity_map
 from lib.radiosity.sampling import direct_at, points_at
 
 LARGE_CELL = 1 / 8  # of the scene's largest side
-LEAST_RAYS = 32
+LEAST_RAYS = 16
 USUAL_CONTRAST = 0.6
 AVERAGED = 0.8  # between samples, interpolation averages their noise
 SMOOTH = 0.25  # dividing a cell once more leaves a quarter of the departure of a smooth field
@@ -57,20 +57,20 @@ def needed_of(world, tree, s, at):
     return tuple(axis[wanted] for axis in at)
 
 
-def tree_of(world, s, base):
+def tree_of(world, s, base, smallest):
     """An empty Quadtree of surface s."""
     cover = None if world.domain(s) is None else partial(world.cover, s)
-    return Quadtree(world.lattices[s], base, world.channels, world.side(s), cover, world.finest(s))
+    return Quadtree(world.lattices[s], base, world.channels, world.side(s), cover, world.finest(s), smallest)
 
 
-def refine_direct(world, base, seed, tau, top, shadow_rays):
+def refine_direct(world, base, seed, tau, top, shadow_rays, smallest=SMALLEST_CELL):
     """Direct trees from their base lattices.
 
     base : {surface: (value (h, w, C), hidden, noise, level)}.  Returns {surface: Quadtree} and counts of spared rays.
     """
     trees, spared = {}, np.zeros(3, dtype=np.int64)
     for s, (value, hidden, noise, level) in base.items():
-        trees[s] = tree_of(world, s, level)
+        trees[s] = tree_of(world, s, level, smallest)
         own = trees[s].wanted()
         trees[s].put(own, value[own], hidden[own], noise[own], np.inf)
 
@@ -87,13 +87,13 @@ def refine_direct(world, base, seed, tau, top, shadow_rays):
     return trees, spared
 
 
-def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K):
+def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, smallest=SMALLEST_CELL):
     """Indirect trees of `surfaces`, by gather rays through the LookupTable: {surface: Quadtree}.
 
     solution : has spread, H_element, n_u, n_v, first; K (surfaces,) gather rays
     for a large cell of usual surroundings.
     """
-    trees = {s: tree_of(world, s, world.base_level(s, level)) for s in surfaces}
+    trees = {s: tree_of(world, s, world.base_level(s, level), smallest) for s in surfaces}
 
     def sample(points):
         n = len(points.x)
