@@ -25,6 +25,7 @@ def own_tessellation(bench):
         lamp = rectangle(corner, *light[1:]), {"E": 1.0, "is_black": True}
         scene = {name: (surface, {"flip": flip}), "lamp": lamp}
         H = bench.maps(scene, {name: 0.5, "lamp": 0.0}, bounces=1)[name][0][..., 0]
+        H = looked_up(H, np.maximum(H.shape, 33))  # a map that was dropped to a few texels must not pass for them
         h, w = H.shape
         S, N = frame_grid(surface, np.linspace(0, 1, w), np.linspace(0, 1, h))
         N = -N if flip else N
