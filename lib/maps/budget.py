@@ -50,8 +50,8 @@ def map_bytes(roots, level):
 def detail(value, hidden):
     """Return D_i: sum over samples of odd i or j of |value - bilinear prediction from the kept ones|, all channels.
 
-    value (h, w, 3) with odd sides, hidden (h, w). A hidden sample adds nothing and predicts nothing: the weights of the
-    others are raised to sum 1; a visible sample between hidden ones is lost whole and adds |value|.
+    value (h, w, 3) with odd sides, hidden (h, w). A hidden sample adds nothing and predicts nothing, unless it is a
+    kept one beside visible ones, which takes their mean; the weights of the others are raised to sum 1.
     """
     lower, weight = _predictions(value, hidden)
     return float(sum(_loss(value[part], ~hidden[part], lower[name], weight[name]) for name, part in PARTS.items()))
@@ -63,9 +63,10 @@ PARTS = {"u": np.s_[0::2, 1::2], "v": np.s_[1::2, 0::2], "uv": np.s_[1::2, 1::2]
 def _predictions(value, hidden):
     """Return sums of visible kept neighbours and their numbers, for samples between two in u, two in v, and four."""
     if hidden.any():
+        beside, weight = _beside(value, hidden)
         seen = ~hidden[0::2, 0::2]
-        kept = np.where(seen[..., None], value[0::2, 0::2], value.dtype.type(0))
-        count = seen.astype(np.float32)
+        kept = np.where(seen[..., None], value[0::2, 0::2], beside.astype(value.dtype))
+        count = (seen | (weight > 0)).astype(np.float32)
     else:
         kept, count = value[0::2, 0::2], None
 
@@ -89,7 +90,9 @@ def low_pass(value, hidden, closed=(False, False)):
 
     At a border the map is continued by odd reflection (v[-1] = 2 v[0] - v[1]), so a border row is filtered along
     itself only, corners stay, and ramps stay ramps. Along a `closed` direction (u, v) it goes round and the last line
-    equals the first. A sample with a hidden neighbour on a line is treated like a border sample of that line.
+    equals the first. A sample with a hidden neighbour on a line is treated like a border sample of that line.  A hidden
+    sample takes the mean of the visible ones around it, if there are any: at a border that runs between the samples
+    that are kept, no light is lost.
     """
     seen = ~hidden
     exact = np.where(seen[..., None], value, 0).astype(np.float64)
@@ -98,7 +101,32 @@ def low_pass(value, hidden, closed=(False, False)):
         other = _smooth(_smooth(exact, seen, closed[1], 0), seen[::2], closed[0], 1)
         result = (result + other) / 2
     kept = hidden[::2, ::2].copy()
+    if kept.any():
+        beside, weight = _beside(value, hidden, closed)
+        result = np.where(kept[..., None], beside, result)
+        kept &= weight <= 0
     return np.where(kept[..., None], 0, result).astype(value.dtype), kept
+
+
+def _beside(value, hidden, closed=(False, False)):
+    """Mean (h', w', 3) float64 of the visible samples around each kept one by the weights (1, 2, 1)/4 along both
+    directions, 0 without one, and the sum of their weights (h', w')."""
+    weight = (~hidden).astype(np.float64)
+    total = np.where(hidden[..., None], 0.0, value)
+    for axis, goes_round in ((1, closed[0]), (0, closed[1])):
+        weight, total = (_binomial(a, axis, goes_round) for a in (weight, total))
+    return total / np.where(weight > 0, weight, 1.0)[..., None], weight
+
+
+def _binomial(a, axis, goes_round):
+    a = np.moveaxis(a, axis, 0)
+    out = a[::2] / 2
+    out[:-1] += a[1::2] / 4
+    out[1:] += a[1::2] / 4
+    if goes_round:
+        out[0] += a[-2] / 4
+        out[-1] = out[0]
+    return np.moveaxis(out, 0, axis)
 
 
 def _smooth(value, seen, closed, axis):

@@ -60,17 +60,31 @@ def test_loss_of_a_map_drawn_by_hand():
     assert budget.detail(value, visible(value)) == 3 * 13
 
 
-def test_hidden_samples_neither_count_nor_predict():
+def test_hidden_samples_do_not_count_and_predict_what_is_beside_them():
     value = grey([[0, 1, 999], [2, 4, 999], [0, 0, 8]])
     hidden = np.array([[0, 0, 1], [0, 0, 1], [0, 0, 0]], bool)
-    # predictions without the hidden corner: top 0, left 0, bottom 4, centre 8/3
-    assert np.isclose(budget.detail(value, hidden), 3 * (1 + 2 + 4 + 4 / 3))
+    # the hidden corner takes (2 x 1 + 4) / 3 = 2; predictions: top 1, left 0, bottom 4, centre 10/4
+    assert np.isclose(budget.detail(value, hidden), 3 * (0 + 2 + 4 + 1.5))
 
 
-def test_a_visible_sample_between_hidden_ones_is_lost_whole():
+def test_a_visible_sample_between_hidden_ones_goes_on_in_them():
     value, hidden = grey([[9, 9, 9], [9, 2, 9], [9, 9, 9]]), np.ones((3, 3), bool)
     hidden[1, 1] = False
-    assert budget.detail(value, hidden) == 6
+    assert budget.detail(value, hidden) == 0
+    kept, kept_hidden = budget.low_pass(value, hidden)
+    assert (kept == 2).all() and not kept_hidden.any()
+
+
+def test_a_disc_in_its_map_keeps_its_light_down_to_the_root():
+    """A face trimmed to a disc: all four corners of its map are outside."""
+    v, u = np.meshgrid(np.linspace(-1, 1, 17), np.linspace(-1, 1, 17), indexing="ij")
+    value, hidden = np.full((17, 17, 3), 7, np.float32), u**2 + v**2 > 0.8
+    for closed in ((False, False), (True, False), (False, True)):
+        kept, out = value, hidden
+        for _ in range(4):
+            kept, out = budget.low_pass(kept, out, closed)
+            assert kept[~out] == pytest.approx(7)
+        assert kept.shape == (2, 2, 3) and not out.any()
 
 
 # ---- low pass
@@ -100,8 +114,8 @@ def test_a_ramp_stays_the_same_ramp_up_to_the_border():
     assert np.array_equal(budget.low_pass(value, visible(value))[0], value[::2, ::2])
     hidden = np.random.default_rng(5).random((9, 17)) < 0.3
     kept, kept_hidden = budget.low_pass(np.where(hidden[..., None], np.float32(1e9), value), hidden)
-    assert np.array_equal(kept_hidden, hidden[::2, ::2])
-    assert np.array_equal(kept[~kept_hidden], value[::2, ::2][~kept_hidden])
+    assert not kept_hidden.any()
+    assert np.array_equal(kept[~hidden[::2, ::2]], value[::2, ::2][~hidden[::2, ::2]])
 
 
 def test_a_closed_direction_goes_round():
