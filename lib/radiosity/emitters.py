@@ -17,7 +17,7 @@ FLATNESS = 0.01  # chord error of the facets, as a share of the size of the line
 MEAN_HEIGHT = 2 / 3  # of a paraboloid above the chords of a small cell, in units of its height above the cell's middle
 HOLLOW = 1e-6  # least such height, as a share of the emitter's size
 MOST_CELLS = 16  # along one direction
-ENOUGH, LEAST = 2048, 8  # facets of all emitters that are known by their triangles, and of each of them
+ENOUGH, LEAST = 1024, 4  # facets of all emitters that are known by their triangles, and of each of them
 
 
 @dataclass(frozen=True)

@@ -91,10 +91,12 @@ def form_factor_facets(x, n, facets):
     side = np.maximum((facets.e1**2).sum(axis=1), (facets.e2**2).sum(axis=1))
     r2 = np.einsum("mkc,mkc->mk", D, D)
     # What may reach below the horizon is cut there, as far off as it matters.
-    cut = np.einsum("mkc,mc->mk", D, n) ** 2 < side
-    is_polygon = ahead & (r2 < np.where(cut, FAR, NEAR) ** 2 * side)
+    height, corners = np.einsum("mkc,mc->mk", D, n), facets.corners()
+    cut = height**2 < side
+    reach = np.linalg.norm(corners - facets.centre[:, None], axis=2).max(axis=1, initial=0.0)
+    is_polygon = ahead & (r2 < np.where(cut, FAR, NEAR) ** 2 * side) & (height > -reach)  # some of it is above
     row, column = np.nonzero(is_polygon)
-    F[row, column] = form_factor_polygon(facets.corners()[column] - x[row, None], n[row])
+    F[row, column] = form_factor_polygon(corners[column] - x[row, None], n[row])
     row, column = np.nonzero(ahead & ~is_polygon & ~cut & (r2 < FAR**2 * side) & (F > 0))
     F[row, column] = form_factor_gauss(x[row], n[row], facets, column)
     return F
