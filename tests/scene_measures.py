@@ -10,6 +10,11 @@ from scipy.spatial import cKDTree
 
 from lib.formats import scene_model
 from lib.nurbs.evaluate import evaluate, evaluate_grid, frame
+from lib.surfaces.loops import inside
+from lib.surfaces.measure import hull
+from lib.surfaces.measure import points as some_points
+from lib.surfaces.mesh import Mesh
+from lib.surfaces.trimmed import TrimmedSurface
 
 SCENES = Path(__file__).parents[1] / "data" / "scenes"
 GAUSS = np.polynomial.legendre.leggauss(8)  # exact for polynomials of degree 15 in each knot span
@@ -60,20 +65,39 @@ def volume(parts):
 
 
 def points(s, n=257):
-    """Points on an n x n grid of parameters, (n n, 3)."""
+    """Points on an n x n grid of parameters, (n n, 3); of a trimmed surface or a mesh the few that say where it is."""
+    if isinstance(s, TrimmedSurface | Mesh):
+        return some_points(s)
     t = np.linspace(0, 1, n)
     return evaluate_grid(s, t, t)[0].reshape(-1, 3)
 
 
 def lowest(*parts):
     """Least z over surfaces: the best of a grid of parameters, three times refined about it."""
-    return min(_lowest(s) for s in parts)
+    floor = [float(hull(s)[:, 2].min()) for s in parts]
+    best = np.inf
+    for index in np.argsort(floor):  # none lies below its control points
+        if floor[index] < best:
+            best = min(best, _lowest(parts[index]))
+    return best
 
 
 def _lowest(s):
+    if isinstance(s, Mesh):
+        return float(s.V[:, 2].min())
+    if isinstance(s, TrimmedSurface):
+        return min(float(s.S[:, 2].min()), _lowest_within(s.base, lambda uv: inside(s, uv)))
+    return _lowest_within(s, None)
+
+
+def _lowest_within(s, is_inside):
+    """Least z of a NurbsSurface where is_inside of (n, 2) parameters says so; None: everywhere."""
     u = v = np.linspace(0, 1, 257)
     for _ in range(4):
         z = evaluate_grid(s, u, v)[0][..., 2]
+        if is_inside is not None:
+            uv = np.stack(np.meshgrid(u, v), axis=-1).reshape(-1, 2)
+            z = np.where(is_inside(uv).reshape(z.shape), z, np.inf)
         j, i = np.unravel_index(z.argmin(), z.shape)
         u = np.linspace(u[max(i - 1, 0)], u[min(i + 1, len(u) - 1)], 33)
         v = np.linspace(v[max(j - 1, 0)], v[min(j + 1, len(v) - 1)], 33)

@@ -3,16 +3,18 @@
 import re
 import shutil
 import subprocess
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
 import yaml
 
-from lib.formats import preflight
+from lib.formats import preflight, scene_model
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 BLOCKS = re.findall(r"^```(\w+)\n(.*?)^```", README, re.MULTILINE | re.DOTALL)
+needs_ocp = pytest.mark.skipif(find_spec("OCP") is None, reason="needs the extra `step`")
 
 
 def block(language, word):
@@ -39,6 +41,31 @@ def test_the_five_lines_are_a_scene(own_scene, tmp_path):
     assert scene.name == "my-room" and f"results/{scene.name}/" in README
     assert {"floor", "lamp", "teapot/01"} <= set(scene.names)
     assert not scene.warnings
+
+
+@pytest.mark.parametrize(
+    ("file", "surfaces"),
+    [
+        ("v7_my_surfaces.3dm", 1),
+        ("CornellBox-Original.obj", 8),
+        ("car.glb", 9),
+        ("teapot.bpt", 32),
+        ("teapot.teaset.txt", 32),
+        pytest.param("NIST_MBE_PMI_11.stp", 10, marks=needs_ocp),
+        pytest.param("test_pipe.iges", 4, marks=needs_ocp),
+    ],
+)
+def test_a_model_and_three_lines_are_a_scene(file, surfaces, tmp_path):
+    name = "model" + Path(file).suffix
+    shutil.copy(ROOT / "tests" / "data" / file, tmp_path / name)
+    lines = block("yaml", "light: studio").replace("model.3dm", name)
+    (tmp_path / "scene.yaml").write_text(lines, encoding="utf-8")
+    made = scene_model.read(tmp_path).scene
+    fronts = [full for full in made.names if full.startswith("model") and not full.endswith("/back")]
+    assert len(lines.splitlines()) == 3 and len(fronts) == surfaces
+    assert scene_model.STUDIO in made.names
+    for kind in ("`.zip` ", f"`{Path(file).suffix}`"):
+        assert kind in README
 
 
 def test_the_settings_shown_are_accepted(own_scene, tmp_path):

@@ -3,19 +3,32 @@
 import re
 import runpy
 import shutil
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from lib.formats import pictures
+from lib.formats import geometry_file, pictures
 from lib.maps.base_texture import evaluate_picture
 from lib.nurbs.evaluate import evaluate, frame
 from lib.nurbs.shape import area, collapsed_sides, is_closed
+from lib.surfaces import measure
+from lib.surfaces.closed import in_closed_shell
 from tests.scene_measures import SCENES, gap, load, lowest, points, signed_distances, surface, surfaces, volume
 
-NAMES = ("fruit_room", "monet_room", "jussi_car", "cornell")
+needs_ocp = pytest.mark.skipif(find_spec("OCP") is None, reason="needs the extra `step`")
+NAMES = (
+    "fruit_room", "monet_room", "jussi_car", "cornell", "conference", pytest.param("cad_part", marks=needs_ocp)
+)  # fmt: skip
 FLOAT, SINK = 2e-5, 2e-4  # an object may hang 0.02 mm above what it stands on, or sink 0.2 mm into it: neither shows
+HARMLESS = (
+    "skipped: ",  # curves and texts of CAD files
+    "v4_DinerMug.3dm: textures that are not used, .*no file name",
+    "v4_PerfumeBottle_Solid.3dm: materials that let light through, opaque here: Etched Glass",
+    "open sheets turned towards the light: ",
+    "car.glb: left out: 12 triangles without an area, 12 triangles listed before",
+)
 
 
 # Every scene
@@ -25,7 +38,7 @@ FLOAT, SINK = 2e-5, 2e-4  # an object may hang 0.02 mm above what it stands on, 
 def test_imports_without_a_warning_that_matters(name):
     settings, scene = load(name)
     assert (scene.E.max(axis=1) > 0).any()
-    assert all("skipped" in warning for warning in scene.warnings), scene.warnings
+    assert not [text for text in scene.warnings if not re.search("|".join(HARMLESS), text)]
     assert "camera" in settings
 
 
@@ -38,17 +51,18 @@ def test_every_file_is_there_with_its_licence(name):
     named = {file: row for row in rows for file in re.findall(r"`([^`]+)`", row.split("|")[1])}
     present = {path.name for path in folder.iterdir() if path.is_file()}
     assert used <= present
-    for file in present - {"README.md", "make_fruit.py"} - ({"scene.yaml"} - set(named)):
+    for file in present - {"README.md", "make_fruit.py", "make_glb.py"} - ({"scene.yaml"} - set(named)):
         assert file in named, f"{file} has no row in README.md"
     for file in used:
         licences = [row for row in rows if f"`{file}`" in row.split("|")[1] and row.count("|") == 4]
-        assert licences and re.search("MIT|CC|public domain|this repository", licences[-1]), file
+        assert licences and re.search("MIT|CC|Apache|public domain|this repository", licences[-1]), file
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_reflectances_are_those_of_real_things(name):
-    for material, given in load(name)[0]["materials"].items():
-        if "reflectance" in given and not {"lumens", "emission"} & set(given):
+    settings, scene = load(name)
+    for material, given in settings["materials"].items():
+        if material in scene.material and "reflectance" in given and not {"lumens", "emission"} & set(given):
             mean = np.mean(given["reflectance"])
             assert 0.05 <= mean <= 0.85, material
 
@@ -163,29 +177,30 @@ def test_boxes_have_their_volume():
     assert volume(surfaces("monet_room", "seat_.*")) == pytest.approx(1.6 * 0.4 * 0.06)
 
 
-def test_teapot_faces_outwards():
-    parts = surfaces("fruit_room", "teapot/.*")
-    assert len(parts) == 32 and not any(flip for _, flip in parts)
-    tubes = {"13": 16, "17": 20}
-    for first, last in tubes.items():  # handle, spout
-        assert volume(parts[int(first) - 1 : last]) > 0
-    size = np.ptp(np.concatenate([points(s, 65) for s, _ in parts]), axis=0)
-    assert 0.17 < np.hypot(size[0], size[1]) < 0.24  # 20 cm from handle to spout, turned
-    body = [parts[k] for k in (*range(12), *range(20, 32))]
-    assert volume(body) == pytest.approx(0.75e-3, rel=0.02)  # a pot of three quarters of a litre
+def test_teapot_mug_and_bottle_have_the_faces_and_sizes_of_their_files():
+    sizes = {
+        "teapot": (97, (0.1908, 0.1108, 0.1127)),
+        "mug": (4, (0.1056, 0.0674, 0.0819)),
+        "bottle": (260, (0.0745, 0.0355, 0.16)),
+    }
+    turns = {"teapot": -35, "mug": 20, "bottle": 15}
+    for name, (count, expected) in sizes.items():
+        parts = [s for s, _ in surfaces("fruit_room", rf"{name}/\d+")]
+        assert len(parts) == count
+        S, angle = np.concatenate([points(s) for s in parts]), np.radians(turns[name])
+        along = S[:, :2] @ [[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]]
+        size = [*np.ptp(along, axis=0), np.ptp(S[:, 2])]
+        assert size == pytest.approx(expected, rel=0.02)  # boxes of control points, of which the surface lacks a little
 
 
-def test_lid_lies_on_its_ledge_within_the_rim():
-    ledge = points(surface("fruit_room", "teapot_ledge/1"), 65)
-    lid = np.concatenate([points(s, 65) for s, _ in surfaces("fruit_room", "teapot/2[5-8]")])
-    rim = np.concatenate([points(s, 65) for s, _ in surfaces("fruit_room", "teapot/0[1-4]")])
-    assert np.ptp(ledge[:, 2]) < 1e-12
-    assert lid[:, 2].min() == pytest.approx(ledge[0, 2], abs=1e-9)
-    foot = rim[rim[:, 2] < rim[:, 2].min() + 1e-9]  # the inner and the outer edge of the rim
-    on_ledge, on_lid, on_rim = (np.linalg.norm(P[:, :2] - [2.54, 2.2], axis=1) for P in (ledge, lid, foot))
-    assert on_ledge.min() < on_lid.max() < on_ledge.max()
-    assert on_ledge.max() == pytest.approx(on_rim.min(), rel=1e-3)
-    assert frame(surface("fruit_room", "teapot_ledge/1"), [0.5], [0.5])[1][0, 2] > 0.99
+def test_lid_lies_in_the_pot():
+    lid = np.concatenate([points(s) for s, _ in surfaces("fruit_room", r"teapot/2\d")])
+    pot = np.concatenate([points(s) for s, _ in surfaces("fruit_room", "teapot/(0[1-9]|1[0-5])")])
+    centre = np.array([2.56, 2.22])
+    flange = np.linalg.norm(lid[:, :2] - centre, axis=1).max()
+    assert flange < np.linalg.norm(pot[pot[:, 2] > pot[:, 2].max() - 0.02][:, :2] - centre, axis=1).max()
+    assert lid[:, 2].min() < pot[:, 2].max() < lid[:, 2].max()  # its rim hangs into the pot, its knob stands out
+    assert cKDTree(pot).query(lid)[0].min() < 0.001
 
 
 def test_duck_faces_outwards():
@@ -201,7 +216,9 @@ def test_duck_faces_outwards():
 # What stands on what
 
 
-@pytest.mark.parametrize("pattern", ["bowl/1", "apple/1", "pear/1", "banana/1", "duck/1", "teapot/.*"])
+@pytest.mark.parametrize(
+    "pattern", ["bowl/1", "apple/1", "pear/1", "banana/1", "duck/1", r"teapot/\d+", r"mug/\d", r"bottle/\d+"]
+)
 def test_still_life_stands_on_the_table(pattern):
     top = points(surface("fruit_room", "table_top"), 2)[:, 2].max()
     clearance = lowest(*(s for s, _ in surfaces("fruit_room", pattern))) - top
@@ -213,11 +230,12 @@ def test_still_life_stands_on_the_table(pattern):
 def test_things_on_the_table_stand_apart():
     groups = [
         np.concatenate([points(s, 65) for s, _ in surfaces("fruit_room", pattern)])
-        for pattern in ("bowl/1", "teapot/.*", "duck/.", "apple/.", "pear/.", "banana/1")
+        for pattern in ("bowl/1", "teapot/.*", "mug/.*", "bottle/.*", "duck/.", "apple/.", "pear/.", "banana/1")
     ]
+    trees = [cKDTree(P) for P in groups]
     for index, P in enumerate(groups):
-        for Q in groups[:index]:
-            assert cKDTree(P).query(Q)[0].min() > 0.005
+        for tree in trees[:index]:
+            assert np.isinf(tree.query(P, distance_upper_bound=0.005)[0]).all()
 
 
 def test_fruit_in_the_bowl_rests_on_the_bowl_and_each_other():
@@ -290,6 +308,74 @@ def test_speeder_stands_on_the_floor_and_casts_only():
         assert np.abs(evaluate(s, np.ones_like(t), t)[0][:, 2]).max() < 1e-12
 
 
+def test_the_car_stands_on_its_tyres_beside_the_craft():
+    _, scene = load("jussi_car")
+    parts = [s for s, _ in surfaces("jussi_car", r"car/\d")]
+    assert len(parts) == 9 and sum(len(s.F) for s in parts) == 1804  # 24 of 1828 have no area or are there twice
+    assert {role for name, role in zip(scene.names, scene.role, strict=True) if name.startswith("car")} == {"full"}
+    assert lowest(*parts) == pytest.approx(0, abs=1e-6)
+    S = np.concatenate([s.V for s in parts])
+    assert np.ptp(S[:, 2]) == pytest.approx(0.42 * (3.5 + 0.5822517), abs=1e-4)
+    assert (S[:, :2].min(axis=0) > 0).all() and (S[:, :2].max(axis=0) < [9, 7]).all()
+    hull = np.concatenate([points(s) for s, _ in surfaces("jussi_car", "speeder/.")])
+    assert cKDTree(hull).query(S)[0].min() > 0.1
+    # Mirrored parts face outwards too: a closed tyre holds a volume.
+    tyres = next(s for s in parts if len(s.F) == 632)
+    A, B, C = measure.corners(tyres)
+    flux = np.einsum("ij,ij->i", A - S.mean(axis=0), np.cross(B - A, C - A)) / 6
+    assert flux[in_closed_shell(tyres.V, tyres.F)].sum() > 0 or flux.sum() > 0
+
+
+# The conference room
+
+
+def test_the_conference_room_has_all_its_triangles():
+    file = SCENES / "conference" / "conference.glb"
+    content = geometry_file.read(file, file.name, "room")
+    assert len(content.patches) == len(content.materials) == 35 and not content.notes
+    assert sum(len(patch.surface.F) for patch in content.patches) == 331179
+    assert sum(measure.area(patch.surface) for patch in content.patches) == pytest.approx(2.37e7, rel=2e-3)
+
+
+def test_the_lamps_hang_under_the_ceiling_and_shine_down():
+    _, scene = load("conference")
+    ceiling = next(
+        s
+        for s in scene.surfaces
+        if isinstance(s, measure.Mesh) and len(s.F) == 2 and np.ptp(s.V[:, 1]) < 1e-9 and s.V[0, 1] > 1
+    )
+    panels = surfaces("conference", r"panel\.\d")
+    assert len(panels) == 6
+    for s, flip in panels:
+        S, N = frame(s, [0.5], [0.5])
+        assert N[0] @ [0, -1, 0] == pytest.approx(1) and not flip
+        assert 0 < ceiling.V[0, 1] - S[0, 1] < 0.01
+        low, high = ceiling.V.min(axis=0), ceiling.V.max(axis=0)
+        assert ((points(s, 2) > low)[:, [0, 2]] & (points(s, 2) < high)[:, [0, 2]]).all()
+
+
+# The parts out of STEP files
+
+
+@needs_ocp
+def test_parts_stand_on_the_cabinet():
+    top = points(surface("cad_part", "top"), 2)[:, 2].max()
+    for pattern, count in ((r"part/\d+", 120), (r"blocks/\d", 9)):
+        parts = [s for s, _ in surfaces("cad_part", pattern)]
+        assert len(parts) == count
+        assert -SINK < lowest(*parts) - top < FLOAT
+        S = np.concatenate([points(s) for s in parts])
+        assert (S[:, :2] > [0.57, 0.97]).all() and (S[:, :2] < [1.83, 1.73]).all()
+
+
+@needs_ocp
+def test_blocks_keep_the_colours_of_their_faces():
+    settings, scene = load("cad_part")
+    names = [m for n, m in zip(scene.names, scene.material, strict=True) if n.startswith("blocks/")]
+    red, blue = (settings["materials"][name]["reflectance"] for name in (names[-1], names[0]))
+    assert len(set(names)) == 2 and red[0] > 3 * red[2] and blue[2] > 3 * blue[0]
+
+
 # The Cornell box
 
 
@@ -331,6 +417,6 @@ def test_make_fruit_writes_the_same_bytes(tmp_path):
             shutil.copy(path, tmp_path)
     runpy.run_path(str(tmp_path / "make_fruit.py"), run_name="__main__")
     written = sorted(tmp_path.glob("*.json"))
-    assert len(written) == 10
+    assert len(written) == 9
     for path in written:
         assert path.read_bytes() == (SCENES / "fruit_room" / path.name).read_bytes(), path.name

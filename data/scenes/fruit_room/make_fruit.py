@@ -121,14 +121,6 @@ def rod(radius, length):
     return surface(2, 1, CIRCLE_KNOTS, [0, 0, 1, 1], points, CIRCLE_WEIGHTS[:, None] * np.ones(2))
 
 
-def annulus(inner, outer, z):
-    """A flat ring at height z, facing up: u round, v inwards."""
-    points = np.empty((9, 2, 3))
-    points[:, :, :2] = CIRCLE[:, None, :] * np.array([outer, inner])[None, :, None]
-    points[:, :, 2] = z
-    return surface(2, 1, CIRCLE_KNOTS, [0, 0, 1, 1], points, CIRCLE_WEIGHTS[:, None] * np.ones(2))
-
-
 def sweep(centre, tangent, up, radius, section, section_knots, section_weights):
     """Sections (k, 2) scaled by radius (m,), laid across the path at centre (m, 3): u round, v along; cubic in v."""
     tangent = tangent / np.linalg.norm(tangent, axis=1, keepdims=True)
@@ -254,8 +246,6 @@ def main():
     write("shade.json", revolve(SHADE, stand=False))
     write("lens.json", revolve(LENS, stand=False))
     write("cord.json", rod(0.004, 1.025))
-    # In the teapot's unit: the lid, r = 1.3, lies on this ledge within the rim, r = 1.4.
-    write("ledge.json", annulus(1.25, 1.4, 2.4))
     write("table_leg.json", rod(0.03, 0.705))
     write("duck.json", *duck())
 
