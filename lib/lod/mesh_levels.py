@@ -166,9 +166,12 @@ class Ladder:
         alive = np.flatnonzero(self.history.death >= k)
         F = root[self.F[alive]]
         X = self._placed(root, base, F, self._normal[alive])
+        face, area = normals(*(X[F[:, j]] for j in range(3)))
+        has_area = area > 0
+        alive, F, face = alive[has_area], F[has_area], face[has_area]
         uv = carry.carried(self.uv, root, alive, X)
         N = carry.carried(self.N, root, alive, X)
-        N = _facing(N, normals(*(X[F[:, j]] for j in range(3)))[0])
+        N = _facing(N, face)
         out = []
         for s, original in enumerate(self._originals):
             own = self.part[alive] == s

@@ -261,3 +261,22 @@ def test_a_picture_shows_the_texture_where_it_was(ball, count):
 def test_the_same_mesh_gives_the_same_levels():
     first, second = (Ladder([sphere(12)]).by_count(200)[0] for _ in range(2))
     assert all(np.array_equal(getattr(first, name), getattr(second, name)) for name in ("S", "UV", "F", "N"))
+
+
+def test_triangles_that_a_collapse_leaves_without_an_area_go(monkeypatch):
+    """The library may put two corners of a triangle in one place: it goes, and no normal is without a direction."""
+    ladder = Ladder([sheet(8)])
+    root = ladder.history.roots(ladder._step(40))
+    F = root[ladder.F[ladder.history.death >= ladder._step(40)]]
+
+    def placed(*_):
+        X = ladder.history.places(ladder.V, ladder._step(40))
+        a, c = F[0, [0, 2]]
+        X[c] = X[a]
+        return X
+
+    monkeypatch.setattr(ladder, "_placed", placed)
+    (patch,) = ladder.by_count(40)
+    assert 0 < len(patch.F) < len(F)
+    assert normals(*(patch.S[patch.F[:, k]] for k in range(3)))[1].min() > 0
+    assert np.linalg.norm(patch.N, axis=1) == pytest.approx(1)
