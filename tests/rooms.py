@@ -7,6 +7,7 @@ import numpy as np
 from lib.formats import artefact, light_maps
 from lib.formats import scene as scene_file
 from lib.formats.rule_settings import rule_settings
+from lib.maps import emission
 from lib.radiosity.world import World
 from stages import balance_resample, refine, sample, shoot, tessellate
 from tests.shapes import box
@@ -28,7 +29,7 @@ BAKE = {
 
 
 def scene_of(surfaces):
-    """A Scene of {name: (surface, facts)}; facts may hold E, role, flip, group, is_black,
+    """A Scene of {name: (surface, facts)}; facts may hold E, role, flip, group, is_black, glow,
     front (name of the surface whose back it is)."""
     names = sorted(surfaces)
     facts = [surfaces[name][1] for name in names]
@@ -47,7 +48,14 @@ def scene_of(surfaces):
         material=["white"] * n,
         up="z",
         warnings=[],
+        glow={k: f["glow"] for k, f in enumerate(facts) if f.get("glow") is not None},
     )
+
+
+def shining(surface, picture, E=1.0, repeat=(1, 1), **facts):
+    """(surface, facts) of a surface that emits E (W/m2 where the picture is white) times a picture (H, W, 3)."""
+    E = np.asarray(E, dtype=float) * emission.average(surface, picture, repeat)
+    return surface, {"E": E, "glow": emission.glow(surface, picture, repeat), **facts}
 
 
 def cube(side=1.0, **facts):

@@ -4,14 +4,16 @@ Written by import_scene, read by all.  Reflectances are not in it: they reach th
 repainted texture of equal average changes nothing here.
 """
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
 
 from lib.formats import artefact, surface_arrays
 from lib.formats.artefact import ArtefactError
+from lib.maps.glow import Glow
 
-KIND, VERSION = "scene", 3
+KIND, VERSION = "scene", 4
 ROLES = ("full", "cast_only", "receive_only")
 
 
@@ -30,6 +32,7 @@ class Scene:
     groups : names of the light groups, at least one
     is_black : (n,) bool, declared reflectance exactly 0 and no texture
     up : "y" or "z";  warnings : sentences for the user
+    glow : {index: lib.maps.glow.Glow} of the surfaces that shine unevenly, E being their mean
     """
 
     names: list
@@ -45,6 +48,7 @@ class Scene:
     material: list
     up: str
     warnings: list
+    glow: dict = dataclasses.field(default_factory=dict)
 
 
 def check(scene, where="scene"):
@@ -75,6 +79,12 @@ def check(scene, where="scene"):
     n_groups = len(scene.groups)
     demand(n_groups > 0 and 0 <= scene.group.min() and scene.group.max() < n_groups, "group", f"0 to {n_groups - 1}")
     demand(scene.up in ("y", "z"), "up", "y or z")
+    for s, glow in scene.glow.items():
+        k = len(glow.box)
+        holds = 0 <= s < n and k > 0 and glow.box.shape == (k, 4) and glow.colour.shape == (k, 3)
+        demand(
+            holds and np.isfinite(glow.colour).all() and (glow.colour >= 0).all(), "glow", "parts with a colour >= 0"
+        )
 
 
 def save(path, scene):
@@ -91,6 +101,11 @@ def save(path, scene):
     }
     arrays = surface_arrays.packed(scene.surfaces, scene.front)
     arrays |= {field: getattr(scene, field) for field in ("front", "flip", "E", "group", "is_black")}
+    glow = [scene.glow[s] for s in sorted(scene.glow)]
+    arrays["glow_surface"] = np.array(sorted(scene.glow), dtype=np.int32)
+    arrays["glow_size"] = np.array([len(one.box) for one in glow], dtype=np.int32)
+    arrays["glow_box"] = np.concatenate([np.zeros((0, 4)), *(one.box for one in glow)])
+    arrays["glow_colour"] = np.concatenate([np.zeros((0, 3)), *(one.colour for one in glow)])
     artefact.write(path, KIND, VERSION, header, arrays)
 
 
@@ -100,8 +115,16 @@ def load(path):
     try:
         surfaces = surface_arrays.unpacked({k: arrays.pop(k) for k in surface_arrays.NAMES}, arrays["front"])
         fields = ("names", "files", "role", "groups", "material", "up", "warnings")
-        scene = Scene(surfaces=surfaces, **{field: header[field] for field in fields}, **arrays)
+        glow = _glow(*(arrays.pop(f"glow_{name}") for name in ("surface", "size", "box", "colour")))
+        scene = Scene(surfaces=surfaces, **{field: header[field] for field in fields}, **arrays, glow=glow)
     except (KeyError, TypeError, ValueError, IndexError, StopIteration) as error:
         raise ArtefactError(f"{path}: damaged ({error}); delete it to have it made again") from error
     check(scene, path)
     return scene
+
+
+def _glow(surface, size, box, colour):
+    """{index: Glow} of the packed arrays."""
+    ends = np.cumsum(size)[:-1]
+    parts = zip(surface.tolist(), np.split(box, ends), np.split(colour, ends), strict=True) if len(surface) else ()
+    return {s: Glow(own, its_colour) for s, own, its_colour in parts}

@@ -52,11 +52,30 @@ def rho_average(surface, picture, repeat=(1, 1)):
 
 def rho_cells(surface, picture, repeat=(1, 1)):
     """Return the cells rho_average is taken on: rho (k, l, 3) float64 and area (k, l) of each, row 0 at v = 0."""
+    return _cells(surface, picture, repeat)[:2]
+
+
+def means_over(surface, picture, repeat, n):
+    """Return the means (n, n, 3) float64 of a picture over n x n equal boxes of the surface's map, weighted by area,
+    and the area (n, n) of the surface in each; row 0 at v = 0.  Means of boxes without a part of it are 0.
+    """
+    if isinstance(surface, Mesh):
+        return mesh_texture.means_over(surface, picture, repeat, n)
+    rho, weight, edges_u, edges_v = _cells(surface, picture, repeat, np.arange(1, n) / n)
+    j, i = (np.minimum((edges[1:] + edges[:-1]) / 2 * n, n - 1).astype(int) for edges in (edges_v, edges_u))
+    total, area = np.zeros((n, n, 3)), np.zeros((n, n))
+    np.add.at(total, (j[:, None], i), rho * weight[..., None])
+    np.add.at(area, (j[:, None], i), weight)
+    return np.divide(total, area[..., None], out=np.zeros_like(total), where=area[..., None] > 0), area
+
+
+def _cells(surface, picture, repeat, lines=()):
+    """rho and area as rho_cells gives them, and the edges of the cells along u and v; `lines` are edges in both."""
     picture = _bottom_up(picture)
     H, W, _ = picture.shape
     base, (part_u, part_v) = whole(surface), _parts(_box_of(surface))
-    edges_u = _cell_edges(base.knots_u, repeat[0] * W, *part_u)
-    edges_v = _cell_edges(base.knots_v, repeat[1] * H, *part_v)
+    edges_u = _cell_edges(np.append(base.knots_u, lines), repeat[0] * W, *part_u)
+    edges_v = _cell_edges(np.append(base.knots_v, lines), repeat[1] * H, *part_v)
     u, v = (edges_u[1:] + edges_u[:-1]) / 2, (edges_v[1:] + edges_v[:-1]) / 2
     _, S_u, S_v = evaluate_grid(base, u, v)
     weight = np.linalg.norm(np.cross(S_u, S_v), axis=2) * np.diff(edges_u) * np.diff(edges_v)[:, None]
@@ -70,7 +89,7 @@ def rho_cells(surface, picture, repeat=(1, 1)):
             return bilinear(picture, x * W * repeat[0], y * H * repeat[1], (wrap_u, wrap_v))
 
         _trim(surface, edges_u, edges_v, rho, weight, values)
-    return rho, weight
+    return rho, weight, edges_u, edges_v
 
 
 def wraps(surface, repeat):

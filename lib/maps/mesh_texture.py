@@ -59,7 +59,25 @@ def rho_average(mesh, picture, repeat=(1, 1)):
     constant pictures.
     """
     low = picture.min(axis=(0, 1)).astype(np.float64)  # taken off first: a constant keeps its value to the last bit
-    pyramid = Pyramid(picture - low.astype(np.float32))
+    contrast = _at_places(mesh, picture - low.astype(np.float32), repeat)[2]
+    return low + contrast.mean(axis=0, dtype=np.float64)
+
+
+def means_over(mesh, picture, repeat, n):
+    """Return the means (n, n, 3) float64 of a mesh's picture over n x n equal boxes of its map, weighted by area, and
+    the share (n, n) of its area in each; row 0 at v = 0.  By the same places as rho_average.
+    """
+    face, weight, value = _at_places(mesh, picture, repeat)
+    uv = np.einsum("nk,nkc->nc", weight, mesh.uv[face])
+    i, j = np.clip(uv * n, 0, n - 1).astype(int).T
+    count = np.bincount(j * n + i, minlength=n * n)
+    total = np.stack([np.bincount(j * n + i, value[:, c], n * n) for c in range(3)], axis=1)
+    return (total / np.maximum(count, 1)[:, None]).reshape(n, n, 3), count.reshape(n, n) / PLACES
+
+
+def _at_places(mesh, picture, repeat):
+    """PLACES places spread by area: their triangles (k,), barycentric weights (k, 3), and the picture there (k, 3)."""
+    pyramid = Pyramid(picture)
     A, B, C = corners(mesh)
     area = np.linalg.norm(np.cross(B - A, C - A), axis=1)
     share = np.cumsum(area) / area.sum()
@@ -71,8 +89,8 @@ def rho_average(mesh, picture, repeat=(1, 1)):
     e, f = T[:, 1] - T[:, 0], T[:, 2] - T[:, 0]
     pixels = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]) / 2 * pyramid.size.prod()
     width = np.sqrt(pixels / np.maximum(np.diff(share, prepend=0.0) * PLACES, 1.0))
-    contrast = pyramid.values(T[face, 0] + second * e[face] + third * f[face], width[face])
-    return low + contrast.mean(axis=0, dtype=np.float64)
+    value = pyramid.values(T[face, 0] + second * e[face] + third * f[face], width[face])
+    return face, np.hstack([1 - second - third, second, third]), value
 
 
 def evaluate(mesh, picture, repeat, w, h):

@@ -12,6 +12,7 @@ import numpy as np
 
 from lib.nurbs import shape
 from lib.nurbs.evaluate import evaluate_grid, frame_grid
+from lib.nurbs.surface import NurbsSurface
 
 FLATNESS = 0.01  # chord error of the facets, as a share of the size of the lines they follow
 MEAN_HEIGHT = 2 / 3  # of a paraboloid above the chords of a small cell, in units of its height above the cell's middle
@@ -61,10 +62,12 @@ class Emitters:
     is_curved: np.ndarray
 
 
-def facets_of(surface, flip=False):
-    """Facets of one surface, emitting along N (negated where `flip`)."""
+def facets_of(surface, flip=False, box=(0, 1, 0, 1)):
+    """Facets of one surface, emitting along N (negated where `flip`); of its part in the box u0, u1, v0, v1."""
     cells_u, cells_v = _cells(surface)
-    u, v = np.linspace(0, 1, cells_u + 1), np.linspace(0, 1, cells_v + 1)
+    u0, u1, v0, v1 = box
+    cells_u, cells_v = max(1, round(cells_u * (u1 - u0))), max(1, round(cells_v * (v1 - v0)))
+    u, v = np.linspace(u0, u1, cells_u + 1), np.linspace(v0, v1, cells_v + 1)
     S, N = frame_grid(surface, u, v)
     S00, S10, S01, S11 = _cell_corners(S)
     exact, is_hollow = _cell_areas(surface, u, v), np.zeros((cells_v, cells_u), dtype=bool)
@@ -194,18 +197,39 @@ def _cell_areas(surface, u, v, order=4):
     return np.einsum("jbia,a,b->ji", density, weight, weight) * np.diff(v)[:, None] * np.diff(u)
 
 
-def gather_emitters(surfaces, flip, E, group):
-    """Emitters of a scene.
+def gather_emitters(surfaces, flip, E, group, glow=None):
+    """Emitters of a scene, by surface.
 
     surfaces : list of n NurbsSurface in the scene's frame, or Facets of other kinds; flip (n,) bool; E (n, 3) exitance,
-    an emitter is E > 0; group (n,) int.
+    an emitter is E > 0; group (n,) int
+    glow : {surface: lib.maps.glow.Glow} of those that shine unevenly, one emitter for each of their parts that
+    shines; of other kinds, a list of the Facets of every part
     """
-    lit = np.flatnonzero(np.asarray(E).max(axis=1, initial=0.0) > 0)
-    parts = [surfaces[s] if isinstance(surfaces[s], Facets) else facets_of(surfaces[s], bool(flip[s])) for s in lit]
+    E = np.asarray(E, dtype=np.float64)
+    of, exitance, parts = [], [], []
+    for s in np.flatnonzero(E.max(axis=1, initial=0.0) > 0):
+        own, surface, turned = (glow or {}).get(s), surfaces[s], bool(flip[s])
+        if own is None:
+            shining, facets = E[s : s + 1], [surface if isinstance(surface, Facets) else facets_of(surface, turned)]
+        else:
+            facets = surface if isinstance(surface, list) else [facets_of(surface, turned, box) for box in own.box]
+            shining = parts_exitance(E[s], own.colour, facets)
+        for e, part in zip(shining, facets, strict=True):
+            if e.max() > 0 and len(part.area):
+                of, exitance, parts = [*of, s], [*exitance, e], [*parts, part]
     fields = Facets.__dataclass_fields__
     empty = {name: np.zeros((0, 3)) for name in ("origin", "e1", "e2", "normal")}
     empty |= {"is_triangle": np.zeros(0, dtype=bool), "area": np.zeros(0), "weight": np.zeros(0)}
     facets = Facets(**{name: np.concatenate([empty[name], *(getattr(p, name) for p in parts)]) for name in fields})
     first = np.concatenate([[0], np.cumsum([len(p.area) for p in parts])]).astype(np.int64)
-    is_curved = np.array([isinstance(surfaces[s], Facets) or _is_bent(surfaces[s]) for s in lit], dtype=bool)
-    return Emitters(facets, first, np.asarray(E, dtype=np.float64)[lit], np.asarray(group)[lit], lit, is_curved)
+    is_curved = np.array([not isinstance(surfaces[s], NurbsSurface) or _is_bent(surfaces[s]) for s in of], dtype=bool)
+    of = np.array(of, dtype=np.int64)
+    return Emitters(facets, first, np.array(exitance).reshape(-1, 3), np.asarray(group)[of], of, is_curved)
+
+
+def parts_exitance(E, colour, parts):
+    """Exitance (L, 3) of the parts of a surface whose own is E (3,): `colour` (L, 3) times E, scaled so that Facets of
+    all `parts` have the power of E on all of them."""
+    area = np.array([part.area @ part.weight for part in parts])
+    power = area @ colour
+    return E * colour * np.divide(area.sum(), power, out=np.zeros(3), where=power > 0)

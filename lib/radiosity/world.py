@@ -14,6 +14,7 @@ from lib.nurbs.coincident import back_to_back
 from lib.nurbs.evaluate import frame_grid
 from lib.nurbs.surface import NurbsSurface
 from lib.radiosity.emitters import facets_of_triangles, gather_emitters, simplified
+from lib.surfaces import boxes
 from lib.surfaces.frames import domain_of, whole
 from lib.surfaces.measure import transformed
 from lib.surfaces.mesh import Mesh
@@ -33,10 +34,14 @@ def _steepest(N):
     return min(float(cosine.min(initial=1.0)) for cosine in along)
 
 
+def _area(V, F):
+    return np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1).sum() / 2
+
+
 class World:
     """What sample and refine need of a scene.
 
-    scene : has names, surfaces (world units), front, flip, role, E, group, groups, is_black
+    scene : has names, surfaces (world units), front, flip, role, E, group, groups, is_black, glow
     casters : has centre, scale, V, F, UV, face_surface, sag, area, extent, is_planar, is_closed, is_collapsed, shell
     """
 
@@ -117,15 +122,34 @@ class World:
     def emitters(self):
         """All emitters, in the scene's frame; cast_only ones shine too."""
         lit = np.flatnonzero(np.asarray(self.scene.E).max(axis=1, initial=0.0) > 0)
-        surfaces = [None] * self.n
+        surfaces, glow = [None] * self.n, self.scene.glow
         for s in lit:
             if isinstance(self.scene.surfaces[s], NurbsSurface):  # exactly
                 surfaces[s] = self.surface(s)
         others = [s for s in lit if surfaces[s] is None]
-        for s, (V, F) in zip(others, simplified([self._triangles(s) for s in others]), strict=True):
-            surfaces[s] = facets_of_triangles(tuple(V[F[:, k]] for k in range(3)), float(self.casters.area[s]))
-        found = gather_emitters(surfaces, self.scene.flip, self.scene.E, self.scene.group)
+        parts = {s: self._lit_parts(s) for s in others}
+        kept = iter(simplified([part for s in others for part in parts[s]]))
+        for s in others:
+            own = [
+                facets_of_triangles(tuple(V[F[:, k]] for k in range(3)), area)
+                for area, (V, F) in ((area, next(kept)) for area in self._part_areas(s, parts[s]))
+            ]
+            surfaces[s] = own if s in glow else own[0]
+        found = gather_emitters(surfaces, self.scene.flip, self.scene.E, self.scene.group, glow)
         return replace(found, is_curved=found.is_curved | self._is_back_to_back[found.surface])
+
+    def _lit_parts(self, s):
+        """[(V, F)] of the parts of surface s, which is known by its triangles, that shine each in its own way."""
+        V, F = self._triangles(s)
+        return boxes.cut(V, self.casters.UV, F, self.scene.glow[s].box) if s in self.scene.glow else [(V, F)]
+
+    def _part_areas(self, s, parts):
+        """Areas of the parts of surface s: shares of its own."""
+        area = float(self.casters.area[s])
+        if len(parts) == 1:
+            return [area]
+        own = np.array([_area(V, F) for V, F in parts])
+        return area * own / max(own.sum(), 1e-300)
 
     def _triangles(self, s):
         """(V, F) of the triangles of surface s that cast shadows, round its lit side."""
