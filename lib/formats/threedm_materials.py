@@ -2,7 +2,8 @@
 
 Colours are what a picker shows, sRGB: diffuse colour, or the base colour of a physically based material (measured with
 rhino3dm 8.35: the conversion keeps the numbers).  White emission counts as the radiance 1 W/(m2 sr), so the exitance
-is pi times the linear colour.  A bitmap takes the place of the diffuse colour.
+is pi times the linear colour; below FAINT of white it is there to brighten a picture, and no light.  A bitmap takes the
+place of the diffuse colour.
 """
 
 import base64
@@ -15,6 +16,7 @@ from lib.formats.mistakes import listed
 from lib.maps.colour import srgb_to_linear
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB (ITU-R BT.709)
+FAINT = 0.05  # of white, linear
 MOST_EMBEDDED = 256 << 20  # bytes of one picture in the file
 
 
@@ -27,7 +29,7 @@ class Materials:
     def __init__(self, model, folder, root=None):
         self._model, self._keys, self.made = model, {}, {}
         self._textures = _Textures(model, Path(folder), Path(root or folder))
-        self._transparent = {}
+        self._transparent, self._faint = {}, {}
 
     def index(self, attributes, layer, parent=None):
         """Index of an object's material, or None: its own, its layer's, or `parent`, the block reference's."""
@@ -58,7 +60,8 @@ class Materials:
     def notes(self):
         """Sentences about textures that are not there and materials that are taken for others."""
         glass = [f"materials that let light through, opaque here: {listed(self._transparent)}"]
-        return self._textures.notes() + (glass if self._transparent else [])
+        faint = [f"materials with a faint glow, which gives no light here: {listed(self._faint)}"]
+        return self._textures.notes() + (glass if self._transparent else []) + (faint if self._faint else [])
 
     def _read(self, found, index):
         name = (found.Name or "").strip() or f"material {index + 1}"
@@ -76,11 +79,13 @@ class Materials:
             repeat = [abs(float(texture.Repeat.X)), abs(float(texture.Repeat.Y))]
             if repeat != [1.0, 1.0] and min(repeat) > 0:
                 material["repeat"] = repeat
-        if max(glow) > 0:
+        if max(glow) >= FAINT:
             material["emission"] = [np.pi * c for c in glow]
         key = self.add(name, material)
         if opacity < 0.999:
             self._transparent[key] = None
+        if 0 < max(glow) < FAINT:
+            self._faint[key] = None
         return key
 
     @property

@@ -156,6 +156,21 @@ def test_materials_come_from_object_layer_and_parent_and_are_linear(tmp_path):
     assert content.notes == ["materials that let light through, opaque here: material 4"]
 
 
+def test_a_faint_glow_is_no_light(tmp_path):
+    made = model()
+    for number, level in enumerate((40, 70)):  # of 255: 0.021 and 0.061 of white
+        glow = rhino3dm.Material()
+        glow.Name, glow.EmissionColor = f"glass {number}", (level, level, level, 255)
+        made.Materials.Add(glow)
+        attributes = rhino3dm.ObjectAttributes()
+        attributes.MaterialSource, attributes.MaterialIndex = rhino3dm.ObjectMaterialSource.MaterialFromObject, number
+        made.Objects.Add(sheet(2 * number), attributes)
+    content = read(written(made, tmp_path / "a.3dm"))
+    assert "emission" not in content.materials["glass 0"]
+    assert content.materials["glass 1"]["emission"] == pytest.approx([0.0612 * np.pi] * 3, rel=1e-2)
+    assert content.notes == ["materials with a faint glow, which gives no light here: glass 0"]
+
+
 def textured(path, *names, embed=None):
     """A file with one sheet for each bitmap name."""
     made = model()
