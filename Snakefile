@@ -255,10 +255,29 @@ rule budget_reduce:
         " --out {output.textures:q} --table {output.table:q} --log {log.text:q} --cost {log.cost:q}"
 
 
+if scene.has_meshes:
+
+    rule thin_meshes:
+        input:
+            scene=rules.import_scene.output,
+            casters=rules.tessellate.output,
+        output:
+            f"{STAGE}/thin_meshes/ladder.npz",
+        log:
+            text=f"{STAGE}/thin_meshes/log.txt",
+            cost=f"{STAGE}/thin_meshes/cost.json",
+        params:
+            *code("thin_meshes"),
+        shell:
+            "{PYTHON:q} -m stages.thin_meshes --scene {input.scene:q} --casters {input.casters:q} --out {output:q}"
+            " --log {log.text:q} --cost {log.cost:q}"
+
+
 rule lod_export:
     input:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
+        ladder=rules.thin_meshes.output if scene.has_meshes else [],
         # Light in vertices needs vertices on the lattice of the final map.
         textures=rules.budget_reduce.output.textures if "gouraud" in scene.reconstruction.values() else [],
     output:
@@ -270,10 +289,11 @@ rule lod_export:
         *code("lod_export"),
         levels=SETTINGS["lod_export"],
         more=["--textures", f"{STAGE}/budget_reduce/textures.npz"] if "gouraud" in scene.reconstruction.values() else [],
+        ladder=["--ladder", f"{STAGE}/thin_meshes/ladder.npz"] if scene.has_meshes else [],
         reconstruction=SETTINGS["reconstruction"],
     shell:
         "{PYTHON:q} -m stages.lod_export --scene {input.scene:q} --casters {input.casters:q} --levels {params.levels:q} --units m"
-        " --level-index {wildcards.k} {params.more:q} --reconstruction {params.reconstruction:q} --out {output:q}"
+        " --level-index {wildcards.k} {params.ladder:q} {params.more:q} --reconstruction {params.reconstruction:q} --out {output:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
 

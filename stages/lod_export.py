@@ -1,7 +1,7 @@
 """Cut one level of detail of the whole scene from the exact surfaces, and measure how far it is from them.
 
-reads   scene.npz, casters.npz; textures.npz if light is to be stored in vertices
-                                                                   (lib.formats.scene, .casters, .textured_maps)
+reads   scene.npz, casters.npz; ladder.npz, which spares finding out how meshes are thinned; textures.npz if light is to
+        be stored in vertices                        (lib.formats.scene, .casters, .mesh_ladder, .textured_maps)
         levels: JSON list, finest first, of {"deviation": length}, {"triangles": n}, {"share": x} or a bare share
 writes  lod_<k>.npz                                                (lib.formats.lod_mesh)
 
@@ -18,6 +18,7 @@ import numpy as np
 
 from lib import door
 from lib.formats import casters, lod_mesh, scene, textured_maps
+from lib.formats.artefact import ArtefactError
 from lib.formats.quantities import METRES, metres
 from lib.lod.levels import DEVIATION, Scene, TooFine
 from lib.refusal import refusal
@@ -27,6 +28,7 @@ from lib.surfaces import tessellate
 def arguments(parser):
     parser.add_argument("--scene", required=True, metavar="FILE", help="scene.npz")
     parser.add_argument("--casters", required=True, metavar="FILE", help="casters.npz")
+    parser.add_argument("--ladder", metavar="FILE", help="ladder.npz, of the scene's meshes")
     parser.add_argument("--textures", metavar="FILE", help="textures.npz, for light in vertices")
     parser.add_argument("--levels", required=True, type=door.json_text, metavar="JSON", help="all levels, finest first")
     parser.add_argument("--level-index", required=True, type=int, metavar="K", help="which of them to cut, from 0")
@@ -46,7 +48,7 @@ def body(args, cost):
     try:
         lines = lattice(x.names, args.textures, args.reconstruction)
         lines = {int(of[s]): joined(lines, np.flatnonzero(of == of[s])) for s in lines}
-        pieces = Scene(surfaces, known(shapes, own), lines, np.bincount(of))
+        pieces = scene_of(surfaces, known(shapes, own), lines, np.bincount(of), args.ladder)
         level = cut(pieces, levels, k, args.units, shapes.scale)
     except TooFine as error:
         raise refusal(f"{json.dumps(asked)} {error}", field=f"lods[{k}]") from None
@@ -63,6 +65,19 @@ def body(args, cost):
     made = in_metres(level, shapes, of, np.asarray(x.flip, dtype=bool), k, asked, note)
     lod_mesh.save(args.out, made)
     cost.notes.update(level=k, triangles=len(made.F), distance=float(made.distance.max()))
+
+
+def scene_of(surfaces, known, lines, copies, ladder):
+    """The lib.lod.levels.Scene, with what a ladder file tells of its meshes."""
+    if ladder is None:
+        return Scene(surfaces, known, lines, copies)
+    from lib.formats import mesh_ladder  # here: scenes without meshes need none of it
+
+    found = mesh_ladder.load(ladder)
+    try:
+        return Scene(surfaces, known, lines, copies, found)
+    except ValueError as error:
+        raise ArtefactError(f"{ladder}: {error}; delete it to have it made again") from error
 
 
 def shapes_of(front):
@@ -106,11 +121,14 @@ def cut(pieces, levels, k, units, scale):
         return pieces.by_deviation(_deviation(asked, units, scale))
     if "triangles" in asked:
         return pieces.by_count(int(asked["triangles"]))
-    first = {"deviation": "0.01 %"} if "share" in levels[0] else levels[0]
-    finest = pieces.by_deviation(DEVIATION) if first is not levels[0] else cut(pieces, levels, 0, units, scale)
+    if "triangles" in levels[0]:
+        finest = cut(pieces, levels, 0, units, scale)
+        count = pieces.copies @ np.diff(finest.mesh.face_start)
+        return finest if asked["share"] == 1 else pieces.by_count(int(asked["share"] * count))
+    tolerance = _deviation(levels[0], units, scale) if "deviation" in levels[0] else DEVIATION
     if asked["share"] == 1:
-        return finest
-    return pieces.by_count(int(asked["share"] * (pieces.copies @ np.diff(finest.mesh.face_start))))
+        return pieces.by_deviation(tolerance)
+    return pieces.by_count(int(asked["share"] * pieces.n_within(tolerance)))
 
 
 def _deviation(asked, units, scale):

@@ -27,7 +27,7 @@ OWNERS = {  # the one importer of each other library: start-up cost per job, and
     "yaml": ("lib/formats/strict_yaml.py",),
     "pythoncdt": ("lib/surfaces/trim_mesh.py",),
     "OCP": ("lib/formats/step_faces.py",),
-    "fast_simplification": ("lib/lod/mesh_levels.py",),
+    "fast_simplification": ("lib/lod/thinned.py",),
     "xatlas": ("lib/surfaces/charts.py",),
 }
 DRAWERS = {"util", "utils", "helper", "helpers", "common", "misc", "tools", "shared", "base"}

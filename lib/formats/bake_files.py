@@ -7,6 +7,7 @@ from pathlib import Path
 from lib.formats import casters, light_maps, scene, solution, textured_maps, trees
 from lib.formats.artefact import ArtefactError, read_json
 from lib.maps import mapset
+from lib.surfaces.mesh import Mesh
 
 GIVEN = {  # name: pattern below the results folder, whether it is a list, whether a report needs it
     "scene": ("stages/import_scene/scene.npz", False, True),
@@ -63,9 +64,11 @@ def load(files):
     halves = [[trees.load(path, half) for path in files[half] or []] for half in ("direct", "indirect")]
     chunks = [light_maps.load(path) for path in files["maps"] or []]
     lods, folder = read_json(files["lods"]), Path(files["lods"]).parent
+    x = read(scene, "scene")
+    has_meshes = any(isinstance(surface, Mesh) for surface in x.surfaces)
     return Bake(
         folder=folder,
-        scene=read(scene, "scene"),
+        scene=x,
         casters=read(casters, "casters"),
         solution=read(solution, "solution"),
         trees=[{s: tree for chunk, _ in half for s, tree in chunk.items()} for half in halves],
@@ -77,15 +80,16 @@ def load(files):
         costs=[
             _named(read_json(path), path)
             for path in files["costs"] or []
-            if _is_current(path, len(files["direct"] or []), len(lods["levels"]))
+            if _is_current(path, len(files["direct"] or []), len(lods["levels"]), has_meshes)
         ],
     )
 
 
-def _is_current(path, n_chunks, n_levels):
-    """Is a cost file of a job that this bake has? Fewer chunks or levels leave those of an earlier one behind, and a
-    report's own is that of the report before."""
-    if Path(path).parent.name == "report":
+def _is_current(path, n_chunks, n_levels, has_meshes):
+    """Is a cost file of a job that this bake has? Fewer chunks or levels, or no meshes, leave those of an earlier one
+    behind, and a report's own is that of the report before."""
+    stage = Path(path).parent.name
+    if stage == "report" or (stage == "thin_meshes" and not has_meshes):
         return False
     numbered = re.fullmatch(r"cost_(?:direct_|indirect_)?(\d+)", Path(path).stem)
     if numbered is None:

@@ -21,11 +21,11 @@ from pathlib import Path
 
 from lib.refusal import Refusal, refusal
 
-VERSION = 3
+VERSION = 4
 ROOT = Path(__file__).resolve().parents[2]
 _FIELDS = (
     "settings", "names", "files", "roles", "is_black", "area", "groups", "tolerances", "reconstruction", "textures",
-    "rho_avg", "geometry_files", "texture_files", "mesh_cells", "slices", "warnings",
+    "rho_avg", "geometry_files", "texture_files", "has_meshes", "mesh_cells", "slices", "warnings",
 )  # fmt: skip
 
 
@@ -42,6 +42,7 @@ class Preflight:
     textures : {surface: {"file": absolute path, "colour_space", "repeat": [n, m]}} of the textured ones
     rho_avg : {surface: [r, g, b]}, the average reflectance it shoots with
     geometry_files, texture_files : absolute paths
+    has_meshes : some surfaces are triangle meshes
     mesh_cells : finest cells on the meshes, about
     slices : {"geometry" | "materials" | "textures": path}
     warnings : sentences for the user
@@ -63,6 +64,7 @@ class Preflight:
     rho_avg: dict
     geometry_files: list
     texture_files: list
+    has_meshes: bool
     mesh_cells: int
     slices: dict
     warnings: list

@@ -71,6 +71,7 @@ def run(folder, overrides=None, pictures_folder=None):
         "rho_avg": rho_avg,
         "geometry_files": [str(source.folder / name) for name in digests],
         "texture_files": sorted(pictures_used),
+        "has_meshes": any(isinstance(surface, Mesh) for surface in made.surfaces),
         "mesh_cells": sum(
             round(one.area / scene_import.finest_cell(one.area, largest) ** 2)
             for one in placed

@@ -13,6 +13,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from lib.surfaces.rows import numbered
+
 AT_ONCE = 400_000  # pairs of a point and a triangle in flight
 
 
@@ -34,8 +36,8 @@ class Wedges:
 
 def wedges(V, F, part, value):
     """The Wedges of values (m, 3, c); part (m,): triangles of different parts share none."""
-    columns = [F.ravel(), np.repeat(part, 3), *value.reshape(-1, value.shape[2]).T + 0.0]
-    number, first = _numbered(columns)
+    place = np.stack([F, np.broadcast_to(part[:, None], F.shape)], axis=2)
+    number, first = numbered(np.concatenate([place, value], axis=2).reshape(3 * len(F), -1))
     of = number.reshape(-1, 3)
     a, b = np.arange(of.size), np.arange(of.size).reshape(-1, 3)[:, [1, 2, 0]].ravel()
     low, high = np.minimum(number[a], number[b]), np.maximum(number[a], number[b])
@@ -154,12 +156,3 @@ def closest_weights(A, B, C, P):
         weight[rows] = 0.0
         weight[rows, i], weight[rows, j] = 1 - t[nearer], t[nearer]
     return weight
-
-
-def _numbered(columns):
-    """(number (n,) of each row, first (k,) row of each number) of the rows of columns (n,)."""
-    number = np.zeros(len(columns[0]), dtype=np.int64)
-    for column in columns:
-        kinds, own = np.unique(column, return_inverse=True)
-        _, first, number = np.unique(number * len(kinds) + own, return_index=True, return_inverse=True)
-    return number, first

@@ -16,6 +16,7 @@ Their far corners collapse into the vertex at no cost, the planes remain in its 
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -36,26 +37,30 @@ class Added:
 
 @dataclass(frozen=True)
 class History:
-    """c collapses of a mesh of n vertices among p of an Added.
+    """c collapses of a mesh of n vertices, m triangles.
 
     pair (c, 2) the vertex that stays, and the one that goes into it; at (c, 3) where the vertex is then, in the unit of
-    the mesh; time (p,) the step in which a vertex goes, c if never; into (p,) where it goes
-    death (m,) the step in which each triangle vanishes, c if never
+    the mesh; death (m,) the step in which each triangle vanishes, c if never
     """
 
+    n: int
     pair: np.ndarray
     at: np.ndarray
-    time: np.ndarray
-    into: np.ndarray
     death: np.ndarray
+
+    @cached_property
+    def _gone(self):
+        """(time (n,), into (n,)): the step in which a vertex goes, c if never, and where it goes."""
+        return _gone(self.n, self.pair)
 
     def counts(self):
         """(c + 1,) triangles left after k steps."""
         return len(self.death) - np.searchsorted(np.sort(self.death), np.arange(len(self.pair) + 1))
 
     def roots(self, k):
-        """(p,) the vertex that each has gone into after k steps."""
-        root = np.where(self.time < k, self.into, np.arange(len(self.time)))
+        """(n,) the vertex that each has gone into after k steps."""
+        time, into = self._gone
+        root = np.where(time < k, into, np.arange(self.n))
         while True:
             further = root[root]
             if (further == root).all():
@@ -63,11 +68,10 @@ class History:
             root = further
 
     def places(self, V, k):
-        """(p, 3) positions after k steps of a mesh with the positions V (n, 3); only roots of V count."""
-        last = np.full(len(self.time), -1)
+        """(n, 3) positions after k steps of a mesh with the positions V (n, 3); only roots count."""
+        last = np.full(self.n, -1)
         last[self.pair[:k, 0]] = np.arange(k)  # of a repeated index the last value stays
-        out = np.zeros((len(self.time), 3))
-        out[: len(V)] = V
+        out = V.copy()
         moved = last >= 0
         out[moved] = self.at[last[moved]]
         return out
@@ -105,19 +109,21 @@ def with_added(V, F, seam, seam_face, locked):
 
 
 def history(V, F, added, pair):
-    """The History of the collapses `pair` (c, 2) of an Added of V (n, 3), F (m, 3).
+    """The History of the collapses `pair` (c, 2) of an Added of V (n, 3), F (m, 3), of the mesh's own vertices alone.
 
     It ends before the first step that would take a vertex of the mesh to a far corner.
     """
     pair = np.asarray(pair, dtype=np.int64).reshape(-1, 2)
-    at, is_sound = _replayed(V, added, pair)
-    if not is_sound.all():
-        first = int(np.flatnonzero(~is_sound)[0])
-        pair, at = pair[:first], at[:first]
-    c, p = len(pair), len(added.P)
-    time, into = np.full(p, c), np.arange(p)
-    time[pair[:, 1]], into[pair[:, 1]] = np.arange(c), pair[:, 0]
-    return History(pair, at, time, into, _deaths(F, time, into, c))
+    own, at, is_sound = _replayed(V, added, pair)
+    is_kept = is_sound.cumprod(dtype=bool) & (own >= 0).all(axis=1)
+    own, at = own[is_kept], at[is_kept]
+    return History(len(V), own, at, _deaths(F, *_gone(len(V), own), len(own)))
+
+
+def _gone(n, pair):
+    time, into = np.full(n, len(pair)), np.arange(n)
+    time[pair[:, 1]], into[pair[:, 1]] = np.arange(len(pair)), pair[:, 0]
+    return time, into
 
 
 def _deaths(F, time, into, c):
@@ -138,7 +144,8 @@ def _deaths(F, time, into, c):
 
 
 def _replayed(V, added, pair):
-    """(at (c, 3) in the unit of V, is_sound (c,)): where the library puts the vertex of each collapse.
+    """(own (c, 2), at (c, 3) in the unit of V, is_sound (c,)): the mesh's own vertices that each collapse joins, -1
+    for none, and where the library puts the vertex.
 
     It does not say, and its own replay_simplification takes 40 s for 331 k triangles; what it does is
     `calculate_error` of its Simplify.h for two border vertices: the best of the two ends and the middle.  Collapses
@@ -147,8 +154,8 @@ def _replayed(V, added, pair):
     Q, X = _quadrics(added), added.P.copy()
     Y = np.zeros_like(X)
     Y[: len(V)] = V
-    is_real = np.arange(len(X)) < len(V)
-    at, is_sound = np.empty((len(pair), 3)), np.empty(len(pair), dtype=bool)
+    stands = np.where(np.arange(len(X)) < len(V), np.arange(len(X)), -1)  # for which of the mesh's own
+    own, at, is_sound = np.empty_like(pair), np.empty((len(pair), 3)), np.empty(len(pair), dtype=bool)
     for step in _rounds(pair, len(X)):
         a, b = pair[step].T
         q = Q[b] + Q[a]
@@ -156,12 +163,14 @@ def _replayed(V, added, pair):
         error = np.stack([_error(q, x) for x in ends])
         best = 2 - (error == error.min(axis=0))[::-1].argmax(axis=0)  # the last of equal ones, as there
         X[a] = np.choose(best[:, None], ends)
-        keeps = np.where(is_real[a] == is_real[b], True, best == np.where(is_real[a], 0, 1))
+        own[step] = both = np.stack([stands[a], stands[b]], axis=1)
+        is_real = both >= 0
+        keeps = np.where(is_real[:, 0] == is_real[:, 1], True, best == np.where(is_real[:, 0], 0, 1))
         Y[a] = np.choose(best[:, None], (Y[a], Y[b], (Y[a] + Y[b]) / 2))
-        is_real[a] |= is_real[b]
+        stands[a] = np.where(is_real[:, 0], both[:, 0], both[:, 1])
         Q[a] = q
         at[step], is_sound[step] = Y[a], keeps
-    return at, is_sound
+    return own, at, is_sound
 
 
 def _rounds(pair, p):

@@ -11,6 +11,7 @@ times.
 """
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -56,16 +57,17 @@ class Scene:
 
     lattice : {surface: (u, v)} interior parameters that have a line in every level, for light stored in vertices
     copies : (n,) int, times each surface's triangles count (2 where both its sides are seen)
+    found : what was found out about the meshes before (lib.lod.mesh_levels.MeshLevels); ValueError if about others
     """
 
-    def __init__(self, surfaces, known, lattice=None, copies=None):
+    def __init__(self, surfaces, known, lattice=None, copies=None, found=None):
         self.surfaces, self.known = surfaces, known
         self.copies = np.ones(len(surfaces), dtype=np.int64) if copies is None else np.asarray(copies)
         kinds = dict(tessellate.KINDS)
         if any(isinstance(s, Mesh) for s in surfaces):
             from lib.lod.mesh_levels import MeshLevels  # here: it takes longer to load than most scenes to cut
 
-            kinds[Mesh] = MeshLevels
+            kinds[Mesh] = partial(MeshLevels, found=found)
         self.pieces = tessellate.Pieces(surfaces, known, lattice, kinds)
         self.size = known.extent.max(axis=1)
 
@@ -82,6 +84,20 @@ class Scene:
         """The Level whose measured distance is at most `tolerance` (> 0)."""
         self._affordable(self.predicted(tolerance))
         return self._level(self.pieces.cut_within(*self.asked_of(tolerance)), tolerance, None, False)
+
+    def n_within(self, tolerance):
+        """Triangles of `by_deviation`; meshes are counted without being made."""
+        self._affordable(self.predicted(tolerance))
+        tolerance, slide = self.asked_of(tolerance)
+        count = np.zeros(len(self.surfaces), dtype=np.int64)
+        for index, part in self.pieces.parts:
+            if hasattr(part, "n_within"):
+                count[index] = part.n_within(tolerance[index], slide[index])
+            else:
+                patches, own = part.cut_within(tolerance[index], slide[index]), tessellate.part(self.known, index)
+                mesh = tessellate.assemble(patches, [self.surfaces[s] for s in index], own)
+                count[index] = np.diff(mesh.face_start)
+        return int(count @ self.copies)
 
     def by_count(self, asked):
         """The Level of at most `asked` triangles, or the smallest there is."""

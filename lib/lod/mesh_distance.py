@@ -1,7 +1,8 @@
 """How far a thinned mesh is from the mesh it came from, and how far its texture slides.
 
 Distances are taken both ways, from vertices and from places inside of triangles to the closest point of the other mesh.
-Slide is the distance between the places that a pair (u, v) has on both.
+Slide is the distance between the places that a pair (u, v) has on both.  Vertices and triangles that both meshes have
+are off by 0; nothing is searched for them.
 """
 
 from dataclasses import dataclass
@@ -11,6 +12,7 @@ import numpy as np
 
 from lib.lod.carry import closest_weights
 from lib.nurbs.facets import normals
+from lib.surfaces.rows import Rows
 from lib.visibility import closest
 
 PLACES = 10_000  # inside of triangles, about: in the largest, where there are more
@@ -43,26 +45,40 @@ class Original:
 
     @cached_property
     def _samples(self):
-        """(points (k, 3), weight (k,) in the mean square): corners, and places in the largest triangles."""
+        """(corners (a, 3), triangles (t, 3) the largest ones, weight of the corners and of places in these in the mean
+        square).
+        """
         V, F = self.mesh.V, self.mesh.F
         used, some = np.unique(F), _largest(V, F)
-        inside = within(V[some])
+        n = len(within(V[some]))
         if len(some) == len(F):
-            weight = np.concatenate([np.zeros(len(used)), np.repeat(_areas(V, some), len(inside) // len(some))])
+            weight = np.concatenate([np.zeros(len(used)), np.repeat(_areas(V, some), n // len(some))])
         else:
             around = np.bincount(F.ravel(), np.repeat(_areas(V, F), 3), len(V))
-            weight = np.concatenate([around[used], np.zeros(len(inside))])
-        return np.concatenate([V[used], inside]), weight / max(weight.sum(), 1e-300)
+            weight = np.concatenate([around[used], np.zeros(n)])
+        return V[used], some, weight / max(weight.sum(), 1e-300)
+
+    @cached_property
+    def _known(self):
+        """Rows of what made meshes may have too: positions, positions with uv, triangles, triangles with uv."""
+        V, F = self.mesh.V, self.mesh.F
+        uv = np.zeros((len(F), 3, 2)) if self.mesh.uv is None else self.mesh.uv
+        carried = np.concatenate([V[F], uv], axis=2)
+        return Rows(V), Rows(carried.reshape(-1, 5)), Rows(V[F].reshape(-1, 9)), Rows(carried.reshape(-1, 15))
 
     def measure(self, V, UV, F):
-        """The Measured of triangles F (m, 3) with vertices V (k, 3), UV (k, 2)."""
-        points, share = self._samples
-        off = _nearest(closest.prepare(V, F), points)[0]
+        """The Measured of triangles F (m, 3) with vertices V (k, 3), all used, and UV (k, 2)."""
+        (corners, largest, share), (places, pairs, triangles, maps) = self._samples, self._known
+        sides = self.mesh.V[largest]
+        has_sides = Rows(V[F].reshape(-1, 9)).holds(sides.reshape(-1, 9))
+        off = _off(closest.prepare(V, F), corners, Rows(V).holds(corners), sides, has_sides)
         some = _largest(V, F)
-        P, uv = np.concatenate([V, within(V[some])]), np.concatenate([UV, within(UV[some])])
-        off_made = _nearest(self._shape, P)[0]
-        distance = float(max(off.max(), off_made.max()))
-        slide = 0.0 if self.mesh.uv is None else float(np.linalg.norm(self.at(uv) - P, axis=1).max())
+        off_made = _off(self._shape, V, places.holds(V), V[some], triangles.holds(V[some].reshape(-1, 9)))
+        distance, slide = float(max(off.max(), off_made.max())), 0.0
+        if self.mesh.uv is not None:
+            both = np.concatenate([V, UV], axis=1)
+            both, _ = _far(both, pairs.holds(both), both[some], maps.holds(both[some].reshape(-1, 15)))
+            slide = float(np.linalg.norm(self.at(both[:, 3:]) - both[:, :3], axis=1).max(initial=0.0))
         return Measured(distance, float(share @ off**2), max(slide, distance))
 
     def at(self, uv):
@@ -80,9 +96,24 @@ def _largest(V, F):
     return F[np.argsort(-_areas(V, F), kind="stable")[:PLACES]]
 
 
+def _off(mesh, corners, has_corner, triangles, has_triangle):
+    """Distances from a prepared mesh of corners (a, 3), then of places in triangles (t, 3, 3); 0 of those it has."""
+    points, is_far = _far(corners, has_corner, triangles, has_triangle)
+    off = np.zeros(len(is_far))
+    off[is_far] = _nearest(mesh, points)[0]
+    return off
+
+
+def _far(corners, has_corner, triangles, has_triangle):
+    """(points (f, c), is_far (n,)) of corners (a, c) and of places in triangles (t, 3, c): those a mesh has not."""
+    inside = within(triangles)
+    is_far = ~np.concatenate([has_corner, np.repeat(has_triangle, len(inside) // len(triangles))])
+    return np.concatenate([corners, inside])[is_far], is_far
+
+
 def _nearest(mesh, points):
     """Distance (n,), face (n,) and weights (n, 3) of the closest places; of the face that float32 found, exactly."""
-    face = closest.closest(mesh, points)[1]
+    face = closest.closest(mesh, points)[1] if len(points) else np.zeros(0, dtype=np.int64)
     corner = [mesh.V[mesh.F[face, k]] for k in range(3)]
     weight = closest_weights(*corner, points)
     at = sum(weight[:, k, None] * corner[k] for k in range(3))

@@ -1,78 +1,67 @@
-"""Levels of detail of triangle meshes: thinned by quadrics, with their charts, borders and normals.  The one importer
-of fast_simplification.
+"""Levels of detail of triangle meshes: how far they may be thinned for a tolerance or a count.
 
-Meshes that share positions are thinned together, so that they still do afterwards.  The library decides on the order of
-collapses (lib.lod.collapse); vertices are then put where the planes of all triangles that went into them, weighted by
-area, fit best; corners keep values of the chart that they came from (lib.lod.carry).  Every level is measured
-(lib.lod.mesh_distance), and the counts and distances of those seen so far tell what another will cost.
+What collapses cost is found once (`Ladder.known`), before any level is asked for: levels all the way down are measured,
+at most NEAR times apart where distances matter.  A level is then most often one of these and only has to be made.
 """
 
 from dataclasses import dataclass, replace
 
-import fast_simplification
 import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from lib.lod import carry, collapse
-from lib.lod.mesh_distance import Original
-from lib.nurbs.facets import Patch, normals
-from lib.surfaces import mesh_pieces
-from lib.surfaces.measure import corners
-from lib.surfaces.mesh import Mesh
-from lib.surfaces.mesh_build import height_ratio, welded
+from lib.lod.collapse import History
+from lib.lod.thinned import Thinned
 
-STEP = 4.0  # times fewer triangles, from one measured level to the next
-TRIALS = 6  # levels measured for a tolerance, after these
-NEAR = 1.05  # times more triangles than needed is near enough
-PULL = 1e-2  # of the area: how much vertices are held where the library put them
-KEPT = 1e-9  # frames: vertices that would move less stay
-TURN = 0.2  # cosine of the angle by which a triangle may turn from what it was: the library's
-FLAT = 0.02  # height over longest edge
-AGAINST = 0.5  # cosine: normals farther from their triangle's than 60 degrees give way to that
+STEP = 2.0  # times fewer triangles, from one measured level to the next
+NEAR = 1.1  # times more triangles than needed is near enough
+SPARE = 0.005  # of all meshes' triangles: that many more than needed, over all groups, are near enough too
+FINE, COARSE = 1e-5, 1e-2  # frames; for tolerances beyond, levels are measured when they are asked for
+ALIKE = 1.02  # levels whose distances differ by less have none between them
+SLIDE = 8.0  # a texture may slide as many tolerances
+TRIALS = 6  # levels measured for a tolerance
 LEAST = 1e-9  # of what is allowed: levels nearer than that count as this near
 
 
 @dataclass(frozen=True)
-class ThinPatch(Patch):
-    """A Patch with the unit normals N (k, 3) of its vertices."""
+class Known:
+    """What takes long to find out about meshes that touch.
 
-    N: np.ndarray
+    index (n,) ascending int64, their numbers;  history : how they are thinned, all together
+    steps (s,) ascending int64, collapses after which they were measured, from none to all
+    measured (s, n, 4) largest distance, its mean square, largest slide, triangles
+    """
+
+    index: np.ndarray
+    history: History
+    steps: np.ndarray
+    measured: np.ndarray
 
 
 class Ladder:
-    """All levels of meshes, a list of n, in a frame of size about 1.
+    """All levels of meshes that touch, a list of n, in a frame of size about 1.
 
+    known : what was found out about them, found again where it is None
+    spare : triangles; that many more than needed are near enough
     tolerance, slide : (n,) limits of each mesh's distance and of its texture's slide, in what follows
     """
 
-    def __init__(self, meshes):
-        self.meshes = meshes
-        self._originals = [Original(mesh) for mesh in meshes]
-        start = np.cumsum([0, *(len(mesh.V) for mesh in meshes)])
-        F = np.concatenate([mesh.F + first for mesh, first in zip(meshes, start, strict=False)])
-        V, F = welded(np.concatenate([mesh.V for mesh in meshes]) + 0.0, F)
-        self.part = np.repeat(np.arange(len(meshes)), [len(mesh.F) for mesh in meshes])
-        self.V, self.F = V, F
-        self.uv = carry.wedges(V, F, self.part, np.concatenate([_uv(mesh) for mesh in meshes]))
-        self.N = carry.wedges(V, F, self.part, np.concatenate([mesh.N for mesh in meshes]))
-        seam, seam_face = self.F.ravel()[self.uv.seam], self.uv.seam[:, 0] // 3
-        edges = np.unique(np.sort(seam, axis=1), axis=0)
-        degree = np.bincount(edges.ravel(), minlength=len(V))
-        self.locked = np.flatnonzero((degree != 0) & (degree != 2))
-        middle, size = (V.min(axis=0) + V.max(axis=0)) / 2, float(np.ptp(V, axis=0).max())
-        added = collapse.with_added((V - middle) / size, F, seam, seam_face, self.locked)
-        collapses = fast_simplification.simplify(
-            added.P, added.T, target_count=1, agg=collapse.AGGRESSIVENESS, return_collapses=True
-        )[2]
-        self.history = collapse.history(V, F, added, collapses)
-        last = np.zeros(len(meshes), dtype=np.int64)
-        np.maximum.at(last, self.part, self.history.death)
-        self._last = last  # collapses that leave a mesh a triangle; after them it keeps one as it was
-        self.counts = self.history.counts() + np.searchsorted(np.sort(last), np.arange(len(self.history.pair) + 1))
-        self._normal = normals(*(V[F[:, k]] for k in range(3)))[0]
-        self._planes = _planes(V, F, seam, seam_face)
-        self._made, self._is_surveyed = {}, False
+    def __init__(self, meshes, known=None, spare=0.0):
+        self.meshes, self.spare = meshes, spare
+        self._thin = Thinned(meshes, None if known is None else known.history)
+        self.counts = self._thin.counts
+        self._made, self._measured = {}, {}
+        if known is None:
+            self._survey()
+            self._made.clear()
+        else:
+            self._measured = dict(zip(known.steps.tolist(), known.measured, strict=True))
+
+    def known(self, index):
+        """What is Known of these meshes, whose numbers are `index`."""
+        steps = np.array(sorted(self._measured), dtype=np.int64)
+        measured = np.array([self._measured[k] for k in steps.tolist()])
+        return Known(np.asarray(index, dtype=np.int64), self._thin.history, steps, measured)
 
     @property
     def smallest(self):
@@ -81,69 +70,85 @@ class Ladder:
 
     def by_count(self, count):
         """A list of ThinPatch of at most `count` triangles, or the smallest level."""
-        return self._level(self._step(count))
+        return self._level(self._thin.step(count))
 
     def about(self, tolerance, slide):
         """A list of ThinPatch of as many triangles as `predicted` says."""
         return self._level(self._likely(tolerance, slide))
 
-    def _step(self, count):
-        """The fewest collapses after which at most `count` triangles are left; all, where more are."""
-        return min(int(np.searchsorted(-self.counts, -count)), len(self.counts) - 1)
+    def predicted(self, tolerance, slide):
+        """Triangles (n,) that a level for tolerance (n,) and slide (n,) will have, about."""
+        return self._thin.counts_of(self._likely(tolerance, slide))
 
     def by_tolerance(self, tolerance, slide):
         """A list of ThinPatch whose measured distance is at most tolerance (n,) and slide at most slide (n,)."""
-        self._survey()
+        return self._level(self._within(tolerance, slide))
+
+    def counts_within(self, tolerance, slide):
+        """Triangles (n,) of `by_tolerance`."""
+        return self._measured[self._within(tolerance, slide)][:, 3].astype(np.int64)
+
+    def _within(self, tolerance, slide):
+        """Collapses that keep within the limits."""
         for trial in range(TRIALS):
             fits, fails = self._around(tolerance, slide)
-            if fails is None or self.counts[fits] <= NEAR * self.counts[fails]:
+            if fails is None or self._is_near(fits, fails):
                 break
             a, b = self.counts[fails], self.counts[fits]
             # Every other time halve the distance: the power law may come near one end alone.
             count = np.sqrt(a * b) if trial % 2 else self._between(fits, fails, tolerance, slide)
-            k = self._step(int(np.clip(count, a * NEAR, b / NEAR)))
-            if k in (fits, fails):
+            k = self._thin.step(int(np.clip(count, a * NEAR, b / NEAR)))
+            if k in self._measured:
                 break
-            self._level(k)
-        return self._level(self._around(tolerance, slide)[0])
-
-    def predicted(self, tolerance, slide):
-        """Triangles (n,) that a level for tolerance (n,) and slide (n,) will have, about."""
-        k = self._likely(tolerance, slide)
-        return np.bincount(self.part[self.history.death >= k], minlength=len(self.meshes)) + (self._last < k)
+            self._measure(k)
+        return self._around(tolerance, slide)[0]
 
     def _likely(self, tolerance, slide):
         """Collapses that will about keep within the limits."""
-        self._survey()
         fits, fails = self._around(tolerance, slide)
-        return fits if fails is None else self._step(int(self._between(fits, fails, tolerance, slide)))
+        return fits if fails is None else self._thin.step(int(self._between(fits, fails, tolerance, slide)))
 
     def _survey(self):
-        """Measure levels all the way down, far apart."""
-        if not self._is_surveyed:
-            self._is_surveyed = True
-            self._level(0)
-            count = self.counts[0] / STEP
-            while count > self.smallest * STEP:
-                self._level(self._step(int(count)))
-                count /= STEP
-            self._level(len(self.counts) - 1)
+        """Measure levels all the way down, and between those that are far apart."""
+        steps, count = [0], self.counts[0] / STEP
+        while count > self.smallest * STEP:
+            steps.append(self._thin.step(int(count)))
+            count /= STEP
+        steps = sorted({*steps, len(self.counts) - 1})
+        for k in steps:
+            self._measure(k)
+        pairs = list(zip(steps[:-1], steps[1:], strict=True))
+        while pairs:
+            i, j = pairs.pop()
+            if self._is_near(i, j) or self._is_idle(i, j):
+                continue
+            k = self._thin.step(int(np.sqrt(self.counts[i] * self.counts[j])))
+            if k not in self._measured:
+                self._measure(k)
+                pairs += [(i, k), (k, j)]
+
+    def _is_near(self, i, j):
+        """Are the triangles after i collapses few more than after j?"""
+        return self.counts[i] <= max(NEAR * self.counts[j], self.counts[j] + self.spare)
+
+    def _is_idle(self, i, j):
+        """Is no tolerance likely to ask for a level between those after i and j collapses?"""
+        fine, coarse = (self._measured[k][:, [0, 2]] / [1, SLIDE] for k in (i, j))
+        return bool((coarse <= np.maximum(ALIKE * fine, FINE)).all() or fine[:, 0].max() > COARSE)
 
     def _excess(self, k, tolerance, slide):
         """The largest ratio of a level's distances and slides to the allowed ones."""
-        of_all = [max(p.distance / t, p.slide / s) for p, t, s in zip(self._made[k], tolerance, slide, strict=True)]
-        return max(LEAST, *of_all)
+        distance, _, slides, _ = self._measured[k].T
+        return max(LEAST, float((distance / tolerance).max()), float((slides / slide).max()))
 
     def _around(self, tolerance, slide):
-        """(the most collapses seen that keep within the limits, the next that do not or None)."""
-        fits, fails = 0, None
-        for k in sorted(self._made):
+        """(the most collapses measured that keep within the limits, the next measured that do not or None)."""
+        fails = None
+        for k in sorted(self._measured, reverse=True):
             if self._excess(k, tolerance, slide) <= 1:
-                fits = k
-            else:
-                fails = k
-                break
-        return fits, fails
+                return k, fails
+            fails = k
+        return 0, fails
 
     def _between(self, fits, fails, tolerance, slide):
         """Count at which the limits are reached: by a power law between two levels, or, above the finest one measured,
@@ -156,53 +161,21 @@ class Ladder:
         return a * (b / a) ** (np.log(low) / np.log(low / high))
 
     def _level(self, k):
+        """The list of ThinPatch after k collapses, with their distances."""
+        self._measure(k)
+        return [
+            replace(patch, distance=float(distance), square=float(square), slide=float(slide))
+            for patch, (distance, square, slide, _) in zip(self._patches(k), self._measured[k], strict=True)
+        ]
+
+    def _measure(self, k):
+        if k not in self._measured:
+            self._measured[k] = self._thin.measured(k, self._patches(k))
+
+    def _patches(self, k):
         if k not in self._made:
-            self._made[k] = self._thinned(k) if k else [_patch(mesh) for mesh in self.meshes]
+            self._made = {k: self._thin.patches(k)}  # the last one alone: all together they are large
         return self._made[k]
-
-    def _thinned(self, k):
-        """The list of ThinPatch after k collapses."""
-        root, base = self.history.roots(k)[: len(self.V)], self.history.places(self.V, k)
-        alive = np.flatnonzero(self.history.death >= k)
-        F = root[self.F[alive]]
-        X = self._placed(root, base, F, self._normal[alive])
-        face, area = normals(*(X[F[:, j]] for j in range(3)))
-        has_area = area > 0
-        alive, F, face = alive[has_area], F[has_area], face[has_area]
-        uv = carry.carried(self.uv, root, alive, X)
-        N = carry.carried(self.N, root, alive, X)
-        N = _facing(N, face)
-        out = []
-        for s, original in enumerate(self._originals):
-            own = self.part[alive] == s
-            mesh = Mesh(X, F[own], N[own], uv=uv[own]) if own.any() else _largest(self.meshes[s])
-            patch = _patch(mesh)
-            found = original.measure(patch.S, patch.UV, patch.F)
-            out.append(replace(patch, distance=found.distance, square=found.square, slide=found.slide))
-        return out
-
-    def _placed(self, root, base, F, given):
-        """Positions by root: where the planes of the triangles that went into a vertex fit best, if no triangle of F
-        becomes flat or turns too far from what it was given as (a, 3); in base, none has.
-        """
-        n = len(base)
-        A, c, area = (np.stack([np.bincount(root, x, n) for x in each.T], axis=1) for each in self._planes)
-        used = np.unique(F)
-        A, c, hold = A[used].reshape(-1, 3, 3), c[used], PULL * area[used]
-        step = -np.linalg.solve(
-            A + hold[:, :, None] * np.eye(3), (np.einsum("nij,nj->ni", A, base[used]) + c)[..., None]
-        )
-        step[np.linalg.norm(step[..., 0], axis=1) < KEPT] = 0.0
-        step[np.isin(used, root[self.locked])] = 0.0
-        X = base.copy()
-        X[used] += step[..., 0]
-        while True:
-            N = normals(*(X[F[:, k]] for k in range(3)))[0]
-            bad = (np.einsum("ij,ij->i", N, given) < TURN) | (height_ratio(X, F) < FLAT)
-            bad &= (X[F] != base[F]).any(axis=(1, 2))
-            if not bad.any():
-                return X
-            X[F[bad].ravel()] = base[F[bad].ravel()]
 
 
 class MeshLevels:
@@ -210,17 +183,38 @@ class MeshLevels:
 
     Meshes that share positions are thinned together.  A mesh has no lines to put: `lattice` is ignored, its light
     stays in its texture.
+    found : a list of Known, of all meshes, as `found` gives it; or None, then it is found out now.  ValueError where it
+    is of other meshes.
     """
 
-    def __init__(self, surfaces, known, lattice=None):
+    def __init__(self, surfaces, known, lattice=None, found=None):
         self.n = len(surfaces)
-        self._ladders = [(index, Ladder([surfaces[s] for s in index])) for index in touching(surfaces)]
+        groups = touching(surfaces) if found is None else [each.index for each in found]
+        if not np.array_equal(np.sort(np.concatenate(groups)), np.arange(self.n)):
+            raise ValueError(f"not of these {self.n} meshes")
+        found = [None] * len(groups) if found is None else found
+        spare = SPARE * sum(len(mesh.F) for mesh in surfaces) / len(groups)
+        self._ladders = [
+            (index, Ladder([surfaces[s] for s in index], each, spare))
+            for index, each in zip(groups, found, strict=True)
+        ]
+
+    def found(self):
+        """A list of Known, which spares finding it again."""
+        return [ladder.known(index) for index, ladder in self._ladders]
 
     def n_triangles(self, tolerance, slide):
         """Triangles (n,) that `cut` will make."""
+        return self._counted(lambda ladder, index: ladder.predicted(tolerance[index], slide[index]))
+
+    def n_within(self, tolerance, slide):
+        """Triangles (n,) that `cut_within` will make."""
+        return self._counted(lambda ladder, index: ladder.counts_within(tolerance[index], slide[index]))
+
+    def _counted(self, count):
         out = np.zeros(self.n, dtype=np.int64)
         for index, ladder in self._ladders:
-            out[index] = ladder.predicted(tolerance[index], slide[index])
+            out[index] = count(ladder, index)
         return out
 
     def cut(self, tolerance, slide):
@@ -256,44 +250,3 @@ def touching(meshes):
     graph = coo_array((np.ones(len(owner), dtype=np.int8), (owner, place)), shape=(size, size))
     group = connected_components(graph, directed=False)[1][: len(meshes)]
     return [np.flatnonzero(group == k) for k in np.unique(group)]
-
-
-def _planes(V, F, seam, seam_face):
-    """(A (n, 9), c (n, 3), area (n, 1)): sums over the triangles around each vertex of a third of their area times
-    n n', d n and 1, for planes n x + d = 0; of seams likewise with the square of their length, for planes along them.
-    """
-    N, area = normals(*(V[F[:, k]] for k in range(3)))
-    along = V[seam[:, 1]] - V[seam[:, 0]]
-    across, _ = normals(np.zeros_like(along), along, N[seam_face])
-    each = [(F[:, k], N, area / 3) for k in range(3)]
-    each += [(seam[:, k], across, (along**2).sum(axis=1) / 2) for k in (0, 1)]
-    A, c, total = np.zeros((len(V), 9)), np.zeros((len(V), 3)), np.zeros((len(V), 1))
-    for vertex, n, weight in each:
-        d = -np.einsum("ij,ij->i", n, V[vertex])
-        np.add.at(A, vertex, weight[:, None] * (n[:, :, None] * n[:, None, :]).reshape(-1, 9))
-        np.add.at(c, vertex, (weight * d)[:, None] * n)
-        np.add.at(total, vertex, weight[:, None])
-    return A, c, total
-
-
-def _largest(mesh):
-    """A mesh of the largest triangle of a mesh."""
-    k = [int(normals(*corners(mesh))[1].argmax())]
-    return replace(mesh, F=mesh.F[k], N=mesh.N[k], uv=_uv(mesh)[k])
-
-
-def _uv(mesh):
-    return np.zeros((len(mesh.F), 3, 2)) if mesh.uv is None else mesh.uv
-
-
-def _facing(N, face):
-    """Unit normals at corners (a, 3, 3): those given, or the triangle's (a, 3) where they are far from it."""
-    length = np.linalg.norm(N, axis=2, keepdims=True)
-    N = N / np.maximum(length, 1e-300)
-    far = (np.einsum("nkc,nc->nk", N, face) < AGAINST) | (length[..., 0] == 0)
-    return np.where(far[..., None], face[:, None], N)
-
-
-def _patch(mesh):
-    patch, N = mesh_pieces.as_patch(mesh)
-    return ThinPatch(**vars(patch), N=N)

@@ -17,6 +17,7 @@ STAGES = [
     "balance_resample",
     "apply_base_texture",
     "budget_reduce",
+    "thin_meshes",
     "lod_export",
     "package",
     "report",

@@ -3,6 +3,7 @@
 import numpy as np
 
 from lib.nurbs.facets import Patch, normals
+from lib.surfaces.rows import numbered
 
 
 class MeshPieces:
@@ -39,7 +40,8 @@ def as_patch(mesh):
     m = len(mesh.F)
     uv = np.zeros((m, 3, 2)) if mesh.uv is None else mesh.uv
     corner = np.concatenate([mesh.F[..., None], uv, mesh.N], axis=2).reshape(3 * m, 6) + 0.0
-    rows, number = np.unique(corner, axis=0, return_inverse=True)
-    V, F = mesh.V[rows[:, 0].astype(np.int64)], number.reshape(m, 3)
+    number, first = numbered(corner)
+    rows = corner[first]
+    V, F = mesh.V[mesh.F.ravel()[first]], number.reshape(m, 3)
     area = normals(*(V[F[:, k]] for k in range(3)))[1]
     return Patch(V, np.clip(rows[:, 1:3], 0.0, 1.0), F, (), 0.0, 0.0, 0.0, float(area.sum())), rows[:, 3:]

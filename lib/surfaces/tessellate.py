@@ -107,7 +107,7 @@ def shapes(surfaces, takes_part):
     )
 
 
-def _part(known, index):
+def part(known, index):
     """What is known of the surfaces `index` (k,) ascending, numbered from 0."""
     own = {f.name: getattr(known, f.name)[index] for f in fields(Shapes) if f.name != "borders"}
     both = np.isin(known.borders[:, [0, 2]], index).all(axis=1)
@@ -136,7 +136,7 @@ class Pieces:
             index = np.flatnonzero([isinstance(s, kind) for s in surfaces])
             if index.size:
                 own = {int(np.searchsorted(index, s)): at for s, at in (lattice or {}).items() if s in index}
-                made = pieces([surfaces[s] for s in index], _part(known, index), own)
+                made = pieces([surfaces[s] for s in index], part(known, index), own)
                 self.parts.append((index, made))
 
     def n_triangles(self, tolerance, slide):

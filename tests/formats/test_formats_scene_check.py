@@ -37,6 +37,7 @@ def home(tmp_path, monkeypatch):
 def test_a_textured_mesh_shoots_with_its_average(home):
     (home / "sheet.obj").write_text(WITH)
     found = preflight.load(home)
+    assert found.has_meshes
     (name,) = found.textures
     assert name.startswith("sheet")
     assert found.rho_avg[name] == pytest.approx([0.5] * 3, abs=1e-3)

@@ -6,10 +6,11 @@ import fast_simplification
 import numpy as np
 import pytest
 
-from lib.lod import carry, collapse
+from lib.lod import carry, collapse, mesh_distance
 from lib.lod.levels import Scene
 from lib.lod.mesh_distance import Original
-from lib.lod.mesh_levels import Ladder, MeshLevels, touching
+from lib.lod.mesh_levels import ALIKE, COARSE, NEAR, Ladder, MeshLevels, touching
+from lib.lod.thinned import Thinned
 from lib.nurbs.facets import normals
 from lib.report import picture
 from lib.report.camera import Camera
@@ -165,10 +166,11 @@ def test_places_are_those_of_the_library():
     added = collapse.with_added(mesh.V / 2, F, F.ravel()[w.seam], w.seam[:, 0] // 3, np.array([3]))
     pairs = fast_simplification.simplify(added.P, added.T, target_count=1, agg=8.0, return_collapses=True)[2]
     history = collapse.history(mesh.V, F, added, pairs)
-    assert len(history.pair) == len(pairs)
-    for k in (len(pairs) // 2, len(pairs) * 9 // 10):
-        theirs, _, number = fast_simplification.replay_simplification(added.P, added.T, pairs[:k])
-        root = history.roots(k)[: len(mesh.V)]
+    assert len(history.pair) == len(mesh.V) - len({pair[0] for pair in pairs} - {pair[1] for pair in pairs})
+    for done in (len(pairs) // 2, len(pairs) * 9 // 10):
+        theirs, _, number = fast_simplification.replay_simplification(added.P, added.T, pairs[:done])
+        k = len(mesh.V) - len(np.unique(number[: len(mesh.V)]))  # of the mesh's own vertices
+        root = history.roots(k)
         ours = history.places(mesh.V, k)[root]
         assert np.allclose(theirs[number[: len(mesh.V)]] / collapse.SCALE * 2, ours, atol=FLOAT32)
         left = root[F]
@@ -263,20 +265,69 @@ def test_the_same_mesh_gives_the_same_levels():
     assert all(np.array_equal(getattr(first, name), getattr(second, name)) for name in ("S", "UV", "F", "N"))
 
 
+def test_measured_levels_lie_close_together_where_tolerances_do(ball):
+    """Down to levels too coarse to ask for, none has many more triangles than the next, if that is farther off."""
+    known = ball.known([0])
+    distance, _, slide, _ = known.measured[:, 0].T
+    counts = ball.counts[known.steps]
+    wanted = (distance[:-1] < COARSE) & ((distance[1:] > ALIKE * distance[:-1]) | (slide[1:] > ALIKE * slide[:-1]))
+    assert wanted.sum() >= 12 and (counts[:-1] <= NEAR * counts[1:] + 2)[wanted].all()
+    assert counts[0] == 6912 and counts[-1] == ball.smallest
+
+
+@pytest.mark.parametrize("tolerance", [0.3, 0.02, 0.004])
+def test_what_is_known_spares_measuring(ball, tolerance, monkeypatch):
+    limits = np.array([tolerance]), np.array([8 * tolerance])
+    (made,) = ball.by_tolerance(*limits)
+    again = Ladder(ball.meshes, ball.known([0]))
+    assert again.counts_within(*limits) == len(made.F) == ball.counts_within(*limits)
+    monkeypatch.setattr(mesh_distance.Original, "measure", None)  # nothing is measured
+    (read,) = again.by_tolerance(*limits)
+    assert all(np.array_equal(getattr(made, name), getattr(read, name)) for name in vars(made) if name != "side")
+
+
+@pytest.mark.parametrize("count", [6000, 1500])
+def test_what_both_meshes_have_is_off_by_nothing(ball, count, monkeypatch):
+    """Distances are those of a search for every place."""
+    (patch,) = ball.by_count(count)
+    original = Original(ball.meshes[0])
+    quick = original.measure(patch.S, patch.UV, patch.F)
+    searched = []
+    nearest = mesh_distance._nearest
+    monkeypatch.setattr(
+        mesh_distance, "_nearest", lambda mesh, points: searched.append(len(points)) or nearest(mesh, points)
+    )
+    original.measure(patch.S, patch.UV, patch.F)
+    few = sum(searched)
+    monkeypatch.setattr(mesh_distance.Rows, "holds", lambda self, rows: np.zeros(len(rows), bool))
+    full = original.measure(patch.S, patch.UV, patch.F)
+    assert sum(searched) - few > few
+    for name in ("distance", "square", "slide"):
+        assert getattr(quick, name) == pytest.approx(getattr(full, name), abs=1e-12)
+
+
+def test_counts_within_are_those_of_the_level():
+    """Of surfaces of all kinds: a share of the first level is a share of what it has."""
+    for tolerance in (0.02, 0.004):
+        level = mixed().by_deviation(tolerance)
+        assert mixed().n_within(tolerance) == len(level.mesh.F)
+
+
 def test_triangles_that_a_collapse_leaves_without_an_area_go(monkeypatch):
     """The library may put two corners of a triangle in one place: it goes, and no normal is without a direction."""
-    ladder = Ladder([sheet(8)])
-    root = ladder.history.roots(ladder._step(40))
-    F = root[ladder.F[ladder.history.death >= ladder._step(40)]]
+    thin = Thinned([sheet(8)])
+    k = thin.step(40)
+    root = thin.history.roots(k)
+    F = root[thin.F[thin.history.death >= k]]
 
     def placed(*_):
-        X = ladder.history.places(ladder.V, ladder._step(40))
+        X = thin.history.places(thin.V, k)
         a, c = F[0, [0, 2]]
         X[c] = X[a]
         return X
 
-    monkeypatch.setattr(ladder, "_placed", placed)
-    (patch,) = ladder.by_count(40)
+    monkeypatch.setattr(thin, "_placed", placed)
+    (patch,) = thin.patches(k)
     assert 0 < len(patch.F) < len(F)
     assert normals(*(patch.S[patch.F[:, k]] for k in range(3)))[1].min() > 0
     assert np.linalg.norm(patch.N, axis=1) == pytest.approx(1)
