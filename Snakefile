@@ -84,7 +84,7 @@ rule all:
 
 rule import_scene:
     input:
-        geometry=watched(scene.geometry_files),
+        geometry=watched(scene.geometry_files + scene.emission_files),
     output:
         f"{STAGE}/import_scene/scene.npz",
     log:

@@ -1,12 +1,14 @@
-"""Sum the light groups, B = rho_avg H, and multiply the light of textured surfaces by their base texture over rho_avg.
+"""Sum the light groups, B = rho_avg H, multiply the light of textured surfaces by their base texture over rho_avg, and
+add the emission of surfaces that shine by a picture.
 
 reads   scene.npz, light maps of every chunk, materials and textures JSON    (lib.formats.scene, .light_maps; pictures)
         materials: {"rho_avg": {surface: [r, g, b]}}
-        textures:  {"textures": {surface: {"file": path, "colour_space": "srgb", "repeat": [n, m]}}}, paths relative
-                   to the scene's folder, which folder.json beside it names
+        textures:  {"textures": {surface: {"file": path, "colour_space": "srgb", "repeat": [n, m]}}, "emission": the
+                   same with "factor": [r, g, b] W/m2 where the picture is white}, paths relative to the scene's folder,
+                   which folder.json beside it names
         settings:  {"texture_level": 10, "intensity": {group: factor or [r, g, b]}}
 writes  textured maps of all surfaces                                         (lib.formats.textured_maps)
-        MAPS_FOLDER/<surface>.exr for each surface: B without base texture, full size
+        MAPS_FOLDER/<surface>.exr for each surface with a light map: B without base texture and emission, full size
 """
 
 import hashlib
@@ -15,13 +17,15 @@ from pathlib import Path
 import numpy as np
 
 from lib import door
+from lib.elements.lattice import roots_of
 from lib.formats import light_maps, pictures, scene, textured_maps
 from lib.formats.artefact import read_json
 from lib.maps import base_texture
+from lib.maps import emission as shine
 from lib.maps.fill import one_deep
 from lib.maps.mapset import pack, side_lengths
 from lib.refusal import Refusal
-from lib.surfaces.measure import collapsed_sides, is_closed, map_domain
+from lib.surfaces.measure import collapsed_sides, extent, is_closed, map_domain
 
 
 def arguments(parser):
@@ -38,55 +42,71 @@ def body(args, cost):
     x = scene.load(args.scene)
     chunk = light_maps.merge([light_maps.load(path) for path in args.maps])
     rho_avg = read_json(args.materials)["rho_avg"]
-    textures = located(read_json(args.textures)["textures"], Path(args.textures).parent / "folder.json")
+    rows, folder_file = read_json(args.textures), Path(args.textures).parent / "folder.json"
+    textures, emission = (located(rows.get(kind, {}), folder_file) for kind in ("textures", "emission"))
     texture_level = checked_level(args.settings.get("texture_level", 10))
     weights = group_weights(x.groups, args.settings.get("intensity", {}), chunk.maps.value.shape[1])
 
     loaded, used = {}, {}
-    light, light_hidden, final, final_hidden, final_level = [], [], [], [], []
-    for k, s in enumerate(chunk.maps.surface):
-        name, surface, hidden = x.names[s], x.surfaces[s], chunk.maps.hidden_map(k)
-        H = np.einsum("jigc,gc->jic", chunk.maps.map(k).astype(np.float64), weights)
-        B = np.where(hidden[..., None], np.float32(0), base_texture.reflected(H, rho_avg[name]))
-        light.append(B)
-        light_hidden.append(hidden)
-        write_map(Path(args.maps_folder) / f"{x.files[s]}.exr", B, hidden, name, surface, rho_avg[name])
+    shown = sorted({*chunk.maps.surface.tolist(), *(s for s, name in enumerate(x.names) if name in emission)})
+    roots, light, final = [], [], []  # level, value, hidden of each
+    for s in shown:
+        name, surface, k = x.names[s], x.surfaces[s], chunk.maps.position(s)
+        if k >= 0:
+            own, level, hidden = chunk.maps.roots[k], int(chunk.maps.level[k]), chunk.maps.hidden_map(k)
+            H = np.einsum("jigc,gc->jic", chunk.maps.map(k).astype(np.float64), weights)
+            B = np.where(hidden[..., None], np.float32(0), base_texture.reflected(H, rho_avg[name]))
+            write_map(Path(args.maps_folder) / f"{x.files[s]}.exr", B, hidden, name, surface, rho_avg[name])
+        else:  # reflects nothing, or only casts shadows
+            own, level = roots_of(extent(surface)), 0
+            w, h = side_lengths(own, level)
+            B, hidden = np.zeros((h, w, 3), np.float32), np.zeros((h, w), bool)
+        roots.append(own)
+        light.append((level, B, hidden))
+        painted = [
+            (row, load_picture(row, name, *kind, loaded, used)) for row, *kind in layers(name, textures, emission)
+        ]
+        for row, picture in painted:
+            common = base_texture.level_on_map(surface, own, level, picture.shape[1::-1], row["repeat"], texture_level)
+            B, hidden = base_texture.upsample(B, hidden, common - level)
+            level = common
         if name in textures:
-            picture = load_picture(textures[name], name, loaded, used)
-            level, B, hidden = textured(
-                B,
-                hidden,
-                chunk.maps.roots[k],
-                chunk.maps.level[k],
-                surface,
-                picture,
-                textures[name]["repeat"],
-                picture_average(rho_avg[name], textures[name].get("factor")),
-                texture_level,
+            row, picture = painted[0]
+            B, hidden = textured(
+                B, hidden, surface, picture, row["repeat"], picture_average(rho_avg[name], row.get("factor"))
             )
-        else:
-            level = int(chunk.maps.level[k])
-        final.append(B)
-        final_hidden.append(hidden)
-        final_level.append(level)
+        if name in emission:
+            row, picture = painted[-1]
+            B, hidden = lit(B, hidden, surface, picture, row["repeat"], weights[x.group[s]] * row["factor"])
+        final.append((level, B, hidden))
 
     sweep(Path(args.maps_folder), {x.files[s] for s in chunk.maps.surface})
 
-    maps, names = chunk.maps, [x.names[s] for s in chunk.maps.surface]
+    names = [x.names[s] for s in shown]
+    is_shining = np.array([name in emission for name in names], bool)
     cost.notes["textured_surfaces"] = sum(name in textures for name in names)
     textured_maps.save(
         args.out,
         textured_maps.TexturedMaps(
             names=names,
-            light=pack(maps.surface, maps.roots, maps.level, light, light_hidden),
-            final=pack(maps.surface, maps.roots, final_level, final, final_hidden),
-            E=(x.E * weights[x.group])[maps.surface],
+            light=pack(shown, roots, *([one[k] for one in light] for k in range(3))),
+            final=pack(shown, roots, *([one[k] for one in final] for k in range(3))),
+            E=np.where(is_shining[:, None], 0.0, (x.E * weights[x.group])[shown]),
             rho_avg=np.array([rho_avg[name] for name in names], np.float64).reshape(-1, 3),
-            textured=np.array([name in textures for name in names], bool),
+            textured=is_shining | np.array([name in textures for name in names], bool),
             pictures=used,
             stats=chunk.stats,
+            shining=[name for name in names if name in emission],
         ),
     )
+
+
+def layers(name, textures, emission):
+    """(row, field, largest value) of the pictures of a surface, its base texture first."""
+    if name in textures:
+        yield textures[name], "texture", 1.0
+    if name in emission:
+        yield emission[name], "emission_texture", pictures.ANY
 
 
 def located(textures, folder_file):
@@ -131,28 +151,32 @@ def picture_average(rho_avg, factor):
     return np.divide(rho_avg, factor, out=np.zeros(3), where=np.asarray(factor) > 0)
 
 
-def load_picture(texture, name, loaded, used):
-    """Return the picture of a texture entry, read once; notes its size under the hash of its bytes."""
-    key = texture["file"], texture["colour_space"]
+def load_picture(row, name, field, most, loaded, used):
+    """Return the picture of a row, read once; notes the size of a base texture under the hash of its bytes."""
+    key = row["file"], row["colour_space"], most
     if key not in loaded:
         try:
-            loaded[key] = pictures.read_linear(*key)
-            digest = hashlib.sha256(Path(texture["file"]).read_bytes()).hexdigest()
+            loaded[key] = pictures.read_linear(row["file"], row["colour_space"], most=most)
+            digest = hashlib.sha256(Path(row["file"]).read_bytes()).hexdigest()
         except Refusal as error:
-            raise Refusal(f"surface {name}: texture: {error}") from None
+            raise Refusal(f"surface {name}: {field}: {error}") from None
         used[digest] = [loaded[key].shape[1], loaded[key].shape[0]]
     return loaded[key]
 
 
-def textured(B, hidden, roots, level, surface, picture, repeat, rho_avg, texture_level):
-    """Return (level, B_final, hidden) on the grid that holds both the light and the picture.
+def textured(B, hidden, surface, picture, repeat, rho_avg):
+    """Return (B_final, hidden) of a map that is fine enough for the picture.
 
     The light of a finer crossing is what the light map shows there, so it mixes charts of a mesh no more than that.
     """
-    common = base_texture.level_on_map(surface, roots, level, picture.shape[1::-1], repeat, texture_level)
-    B, hidden = base_texture.upsample(B, hidden, common - level)
-    rho, outside = base_texture.on_map(surface, picture, repeat, *side_lengths(roots, common))
-    return common, base_texture.apply(B, rho, rho_avg), hidden | outside
+    rho, outside = base_texture.on_map(surface, picture, repeat, *hidden.shape[::-1])
+    return base_texture.apply(B, rho, rho_avg), hidden | outside
+
+
+def lit(B, hidden, surface, picture, repeat, factor):
+    """Return (B + E, hidden) of a map; E (h, w, 3) is a picture times `factor` (3,) [W/m^2]."""
+    value, outside = shine.on_map(surface, picture, repeat, *hidden.shape[::-1])
+    return (B + value * factor).astype(np.float32), hidden | outside
 
 
 def sweep(folder, stems):

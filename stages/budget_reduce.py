@@ -48,7 +48,9 @@ def body(args, cost):
     textured_maps.save(args.out, dataclasses.replace(x, **{PROFILES[profile]: after}))
     record = table(x.names, profile, order, T, fixed, before, after, steps, D)
     # Brightness is that of the whole light: a smaller budget must not change it.
-    write_json(args.table, {**record, "exposure": exposure.automatic(x.final, shapes.area[x.final.surface])})
+    write_json(
+        args.table, {**record, "exposure": exposure.automatic(textured_maps.reflected(x), shapes.area[x.final.surface])}
+    )
     cost.notes["levels_removed"] = len(steps)
 
 

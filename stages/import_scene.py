@@ -1,7 +1,7 @@
 """Turn a scene's geometry, inline or in files, into named NURBS surfaces in world metres.
 
 reads   geometry-<hash>.json    the slice of the settings for geometry, roles and light     (lib.formats.scene_import)
-        folder.json beside it, and the geometry files in the folder it names
+        folder.json beside it, and the geometry files and emission pictures in the folder it names
 writes  scene.npz                                                                           (lib.formats.scene)
 
     python -m stages.import_scene --describe PATH      lists what a file or a scene folder holds (stages.describe)
@@ -22,8 +22,9 @@ def arguments(parser):
 
 def body(args, cost):
     at = artefact.read_json(Path(args.scene_slice).parent / "folder.json")
-    cache = Path(args.scene_slice).parents[1] / "cache"
-    made = scene_import.read(artefact.read_json(args.scene_slice), at["folder"], at["file"], cache)
+    home = Path(args.scene_slice).parents[1]
+    piece = artefact.read_json(args.scene_slice)
+    made = scene_import.read(piece, at["folder"], at["file"], home / "cache", home / "pictures")
     for warning in made.warnings:
         door.warn(warning)
     scene.save(args.out, made)

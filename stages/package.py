@@ -7,6 +7,7 @@ reads   scene.npz, casters.npz, textures.npz, lod_<k>.npz of every level, finest
 writes  RESULTS/textures/<surface>.png, scene_LOD<k>.gltf and .bin, scene.glb, lods.json
 
 Profile `standard`: KHR_materials_unlit, base colour texture = (B_final + E) / pi times exposure, sRGB, one a surface.
+A surface that shines by a picture has it, times its emission, in place of E.
 A surface of one even colour gets that colour and no texture.  A surface that only casts shadows has no map: its
 vertices carry an estimate, its reflectance in the lamps' light without shadows and the mean radiosity of the rest.
 Reconstruction `gouraud` puts a map's light into the vertices, and so does `auto` where it would not show: all levels
@@ -44,7 +45,7 @@ def body(args, cost):
     asked = args.settings.get("exposure", "auto")
     if asked == "auto" and args.budget:
         asked = read_json(args.budget)["exposure"]
-    exposure = chosen_exposure(asked, maps.final, shapes.area[mapped])
+    exposure = chosen_exposure(asked, textured_maps.reflected(maps), shapes.area[mapped])
     extras = {"unit": "B_over_pi", "encoding": "srgb", "exposure": exposure}
     rho_avg, ways = read_json(args.materials)["rho_avg"], args.settings.get("reconstruction", {})
     looks = export.looks(x, shapes, maps, rho_avg, exposure, ways, levels, results)

@@ -90,7 +90,8 @@ def _material(material):
     """One material in words."""
     rho = material.get("texture") or " ".join(f"{x:g}" for x in reflectance(material))
     parts = [f"texture {rho}" if "texture" in material else f"reflectance {rho}"]
-    parts += [f"{key} {material[key]}" for key in ("emission", "power", "lumens", "group") if key in material]
+    light = ("emission", "power", "lumens", "emission_texture", "group")
+    parts += [f"{key} {material[key]}" for key in light if key in material]
     return ", ".join(parts)
 
 

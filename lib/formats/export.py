@@ -11,7 +11,7 @@ from functools import partial
 
 import numpy as np
 
-from lib.formats import gltf, pictures
+from lib.formats import gltf, pictures, textured_maps
 from lib.maps import display, estimate, gouraud
 from lib.surfaces.mesh import Mesh
 
@@ -34,7 +34,7 @@ def looks(x, shapes, maps, rho_avg, exposure, reconstruction, levels, results):
     shapes : Casters;  maps : TexturedMaps;  rho_avg : {name: (3,)};  levels : LodMeshes;  results : Path
     reconstruction : {name: "texture" or "gouraud"} of surfaces that ask for one, the rest is "auto"
     """
-    mean_B = display.mean_radiosity(maps.final, shapes.area[maps.final.surface])
+    mean_B = display.mean_radiosity(textured_maps.reflected(maps), shapes.area[maps.final.surface])
     lamps = _facets(levels[-1], np.flatnonzero(x.E.any(axis=1)), x.E)
     out = []
     for s, name in enumerate(x.names):

@@ -7,7 +7,7 @@ Rules for what a texture file may hold:
 - grey becomes three equal channels; palettes are expanded; 16 bit is read as 16 bit; an Exif orientation is applied;
 - alpha is ignored: the colours are taken as stored, not composited (one warning if any pixel is not opaque);
 - integer files are decoded by `colour_space` (srgb or linear); float files (EXR, HDR, ...) are linear whatever it says;
-- every value must be a reflectance, 0 <= rho <= 1.
+- every value must be a reflectance, 0 <= rho <= 1; of emission pictures a finite number >= 0.
 """
 
 from __future__ import annotations
@@ -27,6 +27,7 @@ from lib.refusal import Refusal
 COLOUR_SPACES = ("srgb", "linear")
 MAX_SIDE = 32768
 MAX_PIXELS = 1 << 26  # 8192 x 8192; 0.8 GB as float32 RGB
+ANY = float(np.finfo(np.float32).max)  # largest value of a picture that is no reflectance
 INTEGERS = {"uint8": np.uint8, "uint16": np.uint16}
 
 
@@ -54,20 +55,21 @@ def read_header(path):
     return Header(width, height, spec.nchannels, _format(spec) not in INTEGERS, spec.alpha_channel >= 0)
 
 
-def read_linear(path, colour_space="srgb", warn=None):
-    """Read a texture as reflectance.
+def read_linear(path, colour_space="srgb", warn=None, most=1.0):
+    """Read a texture as reflectance, or as emission.
 
     Parameters
     ----------
     path : picture file
     colour_space : "srgb" or "linear", how integer files are encoded
     warn : callable(text) or None; told about ignored alpha and about float files called sRGB
+    most : the largest value allowed, 1 or ANY
 
     Returns
     -------
-    (h, w, 3) float32, linear RGB in [0, 1], row 0 = top.
+    (h, w, 3) float32, linear RGB in [0, most], row 0 = top.
 
-    Raises Refusal as read_header does, and for damaged pixels or a texel that is negative, above 1 or NaN.
+    Raises Refusal as read_header does, and for damaged pixels or a texel that is negative, above `most` or NaN.
     """
     if colour_space not in COLOUR_SPACES:
         raise Refusal(f"{path}: colour_space: {colour_space!r}, allowed are {' and '.join(COLOUR_SPACES)}")
@@ -90,7 +92,7 @@ def read_linear(path, colour_space="srgb", warn=None):
     colour = _upright(pixels[..., _colour_channels(spec)], _orientation(spec))
     if kind in INTEGERS:
         return np.ascontiguousarray(_decode(colour, colour_space))
-    _check_reflectance(path, colour)
+    _check_values(path, colour, most)
     return np.ascontiguousarray(colour, dtype=np.float32)
 
 
@@ -101,12 +103,13 @@ def _decode(codes, colour_space):
     return (srgb_to_linear(table) if colour_space == "srgb" else table).astype(np.float32)[codes]
 
 
-def _check_reflectance(path, colour):
-    bad = ~((colour >= 0) & (colour <= 1))
+def _check_values(path, colour, most):
+    bad = ~((colour >= 0) & (colour <= most))
     if bad.any():
         row, column, channel = (int(x) for x in np.argwhere(bad)[0])
         found = float(colour[row, column, channel])
-        raise Refusal(f"{path}: pixel row {row}, column {column}: {found:g}, a reflectance must be 0 <= rho <= 1")
+        what = "a reflectance must be 0 <= rho <= 1" if most == 1 else "an emission must be a finite number >= 0"
+        raise Refusal(f"{path}: pixel row {row}, column {column}: {found:g}, {what}")
 
 
 def _open(path):

@@ -6,7 +6,8 @@ one as its input re-runs for what is in it and for nothing else.
 
     geometry-<hash>.json    what import_scene needs (see scene_import)
     materials-<hash>.json   {"rho_avg": {surface: [r, g, b]}}
-    textures-<hash>.json    {"textures": {surface: {file (relative to the folder), colour_space, repeat, digest}}}
+    textures-<hash>.json    {"textures": {surface: {file (relative to the folder), colour_space, repeat, digest}},
+                             "emission": the same of emission pictures, and factor [r, g, b]: W/m2 where it is white}
     folder.json             {"folder", "file"}: where the scene lies; no rule's input
 
 The outcome is kept in preflight.json under the content of all it was made from; a parse that finds nothing changed
@@ -21,11 +22,11 @@ from pathlib import Path
 
 from lib.refusal import Refusal, refusal
 
-VERSION = 4
+VERSION = 5
 ROOT = Path(__file__).resolve().parents[2]
 _FIELDS = (
     "settings", "names", "files", "roles", "is_black", "area", "groups", "tolerances", "reconstruction", "textures",
-    "rho_avg", "geometry_files", "texture_files", "has_meshes", "mesh_cells", "slices", "warnings",
+    "rho_avg", "geometry_files", "texture_files", "emission_files", "has_meshes", "mesh_cells", "slices", "warnings",
 )  # fmt: skip
 
 
@@ -41,7 +42,7 @@ class Preflight:
     tolerances, reconstruction : {surface: value} of those that ask for their own
     textures : {surface: {"file": absolute path, "colour_space", "repeat": [n, m]}} of the textured ones
     rho_avg : {surface: [r, g, b]}, the average reflectance it shoots with
-    geometry_files, texture_files : absolute paths
+    geometry_files, texture_files, emission_files : absolute paths; of pictures that shine, in both of the last
     has_meshes : some surfaces are triangle meshes
     mesh_cells : finest cells on the meshes, about
     slices : {"geometry" | "materials" | "textures": path}
@@ -64,6 +65,7 @@ class Preflight:
     rho_avg: dict
     geometry_files: list
     texture_files: list
+    emission_files: list
     has_meshes: bool
     mesh_cells: int
     slices: dict

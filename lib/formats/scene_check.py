@@ -4,7 +4,18 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from lib.elements.lattice import MOST_ROOTS, roots_of
-from lib.formats import artefact, geometry_file, pictures, scene, scene_import, scene_model, scene_table, settings
+from lib.formats import (
+    artefact,
+    emission_pictures,
+    geometry_file,
+    pictures,
+    scene,
+    scene_import,
+    scene_model,
+    scene_table,
+    settings,
+)
+from lib.formats.emission_pictures import EMBEDDED, colour_space
 from lib.formats.mistakes import Mistakes, listed
 from lib.maps.base_texture import rho_average
 from lib.maps.budget import gpu_bytes, smallest_total
@@ -16,7 +27,6 @@ from lib.surfaces.tessellate import frame
 DIGITS = 4  # of an average reflectance: a repainted texture whose average moves less re-bakes nothing
 AUTO = "auto"  # the reconstruction of surfaces that ask for none
 BRIGHT = 0.95  # reflectances above are allowed but rarely meant; shots grow as 1 / (1 - rho)
-LINEAR = (".exr", ".hdr")
 
 
 @dataclass(frozen=True)
@@ -45,16 +55,23 @@ def run(folder, overrides=None, pictures_folder=None):
     source, wanted, placed, table, made = model.source, model.settings, model.placed, model.table, model.scene
     scene.check(made, source.file)
     keep_pictures(model.pictures, pictures_folder)
-    warnings = list(made.warnings)
+    warnings = [*made.warnings, *model.warnings]
     asked = [n for n, s in zip(made.names, made.surfaces, strict=True) if isinstance(s, Mesh) and _is_gouraud(table[n])]
     if asked:
         warnings.append(f"reconstruction: light in vertices is not for meshes; textures instead: {listed(asked)}")
     textures, rho_avg = _reflectances(source, wanted, made, pictures_folder, warnings)
     digests = {name: geometry_file.digest(source.folder / name) for name in _geometry_files(wanted, source.folder)}
     pictures_used = {row["file"]: geometry_file.digest(row["file"]) for row in textures.values()}
+    shining = {name: row["glow"] for name, row in table.items() if "glow" in row}
+    shine_paths = {
+        row["file"]: str(emission_pictures.located(row["file"], source.folder, pictures_folder or ""))
+        for row in shining.values()
+    }
+    shine_digests = {written: geometry_file.digest(path) for written, path in shine_paths.items()}
+    pictures_used |= {path: shine_digests[written] for written, path in shine_paths.items()}
     largest = float(frame(made.surfaces)[1])
     resolved = settings.resolve(wanted, largest)
-    _check_budget(resolved["budget"], source, made)
+    _check_budget(resolved["budget"], source, made, shining)
     area = {one.name: one.area for one in placed}
     materials = wanted.get("materials", {})
     outcome = {
@@ -71,6 +88,7 @@ def run(folder, overrides=None, pictures_folder=None):
         "rho_avg": rho_avg,
         "geometry_files": [str(source.folder / name) for name in digests],
         "texture_files": sorted(pictures_used),
+        "emission_files": sorted(shine_paths.values()),
         "has_meshes": any(isinstance(surface, Mesh) for surface in made.surfaces),
         "mesh_cells": sum(
             round(one.area / scene_import.finest_cell(one.area, largest) ** 2)
@@ -80,7 +98,7 @@ def run(folder, overrides=None, pictures_folder=None):
         "warnings": warnings,
     }
     slices = {
-        "geometry": scene_import.geometry_slice(wanted, table, digests),
+        "geometry": scene_import.geometry_slice(wanted, table, digests, shine_digests),
         "materials": {"rho_avg": rho_avg},
         "textures": {
             "textures": {
@@ -91,7 +109,16 @@ def run(folder, overrides=None, pictures_folder=None):
                 }
                 for name, material in zip(made.names, made.material, strict=True)
                 if (row := textures.get(name))
-            }
+            },
+            "emission": {
+                name: {
+                    **row,
+                    "file": _relative(shine_paths[row["file"]], row["file"]),
+                    "digest": shine_digests[row["file"]],
+                    **({"embedded": True} if row["file"].startswith(EMBEDDED) else {}),
+                }
+                for name, row in shining.items()
+            },
         },
     }
     scene_file = source.folder / "scene.yaml"
@@ -101,9 +128,13 @@ def run(folder, overrides=None, pictures_folder=None):
     )
 
 
-def _check_budget(T, source, made):
+def _check_budget(T, source, made, shining):
     """Refuse a texture budget [bytes] that the smallest maps of these surfaces exceed."""
-    mapped = [s for s, role in enumerate(made.role) if role != "cast_only" and not made.is_black[s]]
+    mapped = [
+        s
+        for s, role in enumerate(made.role)
+        if made.names[s] in shining or (role != "cast_only" and not made.is_black[s])
+    ]
     if T >= len(mapped) * gpu_bytes(MOST_ROOTS + 1, 2):  # spares measuring them
         return
     smallest = smallest_total([roots_of(extent(made.surfaces[s])) for s in mapped])
@@ -135,7 +166,7 @@ def keep_pictures(found, folder):
 
 
 def _relative(path, written):
-    return path if written.startswith("embedded:") else written
+    return path if written.startswith(EMBEDDED) else written
 
 
 def _reflectances(source, wanted, made, pictures_folder, warnings):
@@ -147,11 +178,10 @@ def _reflectances(source, wanted, made, pictures_folder, warnings):
         if "texture" not in material:
             rho_avg[name] = scene_table.reflectance(material)
             continue
-        embedded = material["texture"].startswith("embedded:")
-        folder = Path(pictures_folder or "") if embedded else source.folder
+        embedded = material["texture"].startswith(EMBEDDED)
         row = {
-            "file": str(folder / material["texture"].removeprefix("embedded:")),
-            "colour_space": material.get("colour_space", _colour_space(material["texture"])),
+            "file": str(emission_pictures.located(material["texture"], source.folder, pictures_folder or "")),
+            "colour_space": material.get("colour_space", colour_space(material["texture"])),
             "repeat": [float(n) for n in material.get("repeat", [1, 1])],
         }
         if embedded:
@@ -187,10 +217,6 @@ def _picture(source, name, written, row, mistakes, warnings):
         what = str(error).removeprefix(f"{path}: ")
         mistakes.add(what, shown, name, "texture")
         return None
-
-
-def _colour_space(texture):
-    return "linear" if Path(texture).suffix.lower() in LINEAR else "srgb"
 
 
 def _warn_bright(made, rho_avg, warnings):

@@ -2,7 +2,8 @@
 
 The slice is a JSON-able dict: units, up, geometry (entries as in scene.yaml, without what is for surfaces), digests
 (SHA-256 of each geometry file), surfaces (see scene_table.resolve).  It does not say where the scene lies, so that a
-folder that moves, or is typed differently, re-bakes nothing.
+folder that moves, or is typed differently, re-bakes nothing.  A surface with an emission picture has its row, with the
+digest of its file, under `glow`.
 """
 
 from dataclasses import replace
@@ -40,21 +41,35 @@ NO_LIGHT = (
 MOST_TOLD = 8  # pairs of surfaces a warning names
 
 
-def geometry_slice(settings, table, digests):
-    """The slice of `settings` that import_scene needs; a change of anything else leaves it as it is."""
+def geometry_slice(settings, table, digests, pictures=None):
+    """The slice of `settings` that import_scene needs; a change of anything else leaves it as it is.
+
+    digests : {geometry file: SHA-256};  pictures : {emission picture as written: SHA-256}
+    """
     return {
         "units": settings["units"],
         "up": settings["up"],
         "geometry": [{key: entry[key] for key in GEOMETRY_KEYS if key in entry} for entry in settings["geometry"]],
         "digests": digests,
-        "surfaces": {name: {key: row[key] for key in SURFACE_KEYS} for name, row in table.items()},
+        "surfaces": {
+            name: {key: row[key] for key in SURFACE_KEYS} | _glow_row(row, pictures) for name, row in table.items()
+        },
     }
 
 
-def read(piece, folder, file, cache=None):
+def _glow_row(row, pictures):
+    """The part of a row that says how unevenly a surface shines: its power is in E."""
+    if "glow" not in row:
+        return {}
+    own = {key: row["glow"][key] for key in ("file", "colour_space", "repeat")}
+    return {"glow": {**own, "digest": pictures[own["file"]]}}
+
+
+def read(piece, folder, file, cache=None, pictures_folder=None):
     """Read the geometry a slice names and return its Scene.
 
     folder : of the scene;  file : scene.yaml as messages name it
+    pictures_folder : where pictures embedded in geometry files are
 
     Raises Refusal for bad input, and if a geometry file is no longer the one the slice was made from.
     """
@@ -71,7 +86,33 @@ def read(piece, folder, file, cache=None):
         if row["front"] is not None:
             one = front[row["front"]]
             placed.append(replace(one, name=name, flip=not one.flip, front=one.name))
-    return assemble(with_charts(placed, piece["geometry"]), notes, piece["surfaces"], piece["up"])
+    placed = with_charts(placed, piece["geometry"])
+    made = assemble(placed, notes, piece["surfaces"], piece["up"])
+    return replace(made, glow=glow(made, piece["surfaces"], folder, pictures_folder, file))
+
+
+def glow(made, table, folder, pictures_folder, file):
+    """{index: Glow} of the surfaces of a Scene that shine unevenly, by their emission pictures."""
+    lit = [s for s, name in enumerate(made.names) if "glow" in table[name] and made.E[s].any()]
+    if not lit:
+        return {}
+    from lib.formats import emission_pictures  # pictures, which few scenes shine by
+    from lib.maps import emission
+
+    opened, out = {}, {}
+    for s in lit:
+        row = table[made.names[s]]["glow"]
+        key = row["file"], row["colour_space"]
+        try:
+            if key not in opened:
+                opened[key] = emission_pictures.read_checked(row, folder, pictures_folder)
+        except ValueError:
+            shown = Path(file).parent / row["file"]
+            raise refusal("changed while the bake ran; start it again", file=shown) from None
+        found = emission.glow(made.surfaces[s], opened[key], row["repeat"])
+        if found is not None:
+            out[s] = found
+    return out
 
 
 def with_charts(placed, entries):

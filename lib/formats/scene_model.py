@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lib.formats import scene_folder, scene_geometry, scene_import, scene_rules, scene_table
+from lib.formats.emission_pictures import EmissionPictures
 from lib.formats.mistakes import listed
 from lib.formats.quantities import METRES
 from lib.surfaces.measure import points
@@ -23,6 +24,7 @@ BACK = "back"  # name of the surface on the other side of x: x/back
 class Model:
     """source : SceneFolder; settings : its settings, with the files' materials and what was decided here filled in;
     placed : list of Placed;  table : rows of scene_table;  scene : Scene;  pictures : {KEY: bytes} embedded in files
+    warnings : about emission pictures, for the user
     """
 
     source: object
@@ -31,6 +33,7 @@ class Model:
     table: dict
     scene: object
     pictures: dict
+    warnings: list
 
 
 def read(folder, overrides=None, cache=None):
@@ -52,16 +55,17 @@ def read(folder, overrides=None, cache=None):
         settings["materials"] = {STUDIO: {"emission": STUDIO_EMISSION}, **settings["materials"]}
         settings.setdefault("camera", before(placed, settings["units"], settings["up"]))
         placed = placed + [replace(one, entry=index) for one in load([entry]).placed]
-    table = scene_table.resolve(settings, placed, where, strict=False)
+    shining = EmissionPictures(source.folder, source.file, pictures)
+    table = scene_table.resolve(settings, placed, where, strict=False, average=shining.average)
     both, turned = both_sides(placed, table)
     backs = with_backs(placed, both)
-    table = scene_table.resolve(settings, backs, where)
+    table = scene_table.resolve(settings, backs, where, average=shining.average)
     for name in turned:
         table[name]["turn"] = not table[name]["turn"]
     if turned:
         notes = [*notes, f"open sheets turned towards the light: {listed(sorted(turned))}"]
     made = scene_import.assemble(backs, notes, table, settings["up"])
-    return Model(source, settings, backs, table, made, pictures)
+    return Model(source, settings, backs, table, made, pictures, shining.warnings)
 
 
 def studio(placed, units, up):

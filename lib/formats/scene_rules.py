@@ -25,10 +25,10 @@ def check(scene):
             add(what, ("materials", name, field), field=f"materials.{name}.{field}")
         if names.complaint(name):
             add(names.complaint(name), ("materials", name), field="materials")
-        if "texture" in material:
-            fault = path_fault(scene.folder, material["texture"])
+        for field in ("texture", "emission_texture"):
+            fault = path_fault(scene.folder, material[field]) if field in material else None
             if fault:
-                add(fault, ("materials", name, "texture"), field=f"materials.{name}.texture")
+                add(fault, ("materials", name, field), field=f"materials.{name}.{field}")
     known = [*materials, DEFAULT_MATERIAL]
     _check_geometry(scene, known, add)
     if not any(brings_materials(entry) for entry in settings["geometry"]):  # else known when the files are read
@@ -96,8 +96,10 @@ def material_faults(material):
     if "texture" in material and "reflectance" in material:
         yield "reflectance", "a material has a texture or a reflectance, not both"
     for field in ("colour_space", "repeat"):
-        if field in material and "texture" not in material:
-            yield field, "is for a material with a texture"
+        if field in material and not {"texture", "emission_texture"} & set(material):
+            yield field, "is for a material with a texture or an emission_texture"
+    if "emission_texture" in material and not lights:
+        yield "emission_texture", "is for a material with emission, power or lumens, which it multiplies"
     if "colour" in material:
         if not {"power", "lumens"} & set(lights):
             yield "colour", "is for a material with power or lumens"

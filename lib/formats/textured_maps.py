@@ -10,7 +10,7 @@ from lib.formats import artefact
 from lib.maps import mapset
 from lib.maps.mapset import MapSet
 
-KIND, VERSION = "textured_maps", 1
+KIND, VERSION = "textured_maps", 2
 FIELDS = ("surface", "roots", "level", "value", "hidden")
 
 
@@ -21,11 +21,13 @@ class TexturedMaps:
     names    : m surface names, in the order of the maps
     light    : MapSet, value (N, 3) B = rho_avg H [W/m^2], without base texture
     final    : MapSet, value (N', 3) B rho / rho_avg [W/m^2]; same surfaces; equals light where there is no texture
+               and the surface does not shine by a picture
     E        : (m, 3) float64 exitance [W/m^2], in neither map
     rho_avg  : (m, 3) float64 in [0, 1], the reflectance the bake used
-    textured : (m,) bool, the surface has a base texture
+    textured : (m,) bool, the surface has a base texture or shines by a picture
     pictures : {sha256 of a base texture's file: [width, height]}, each file once
     stats    : {surface name: {figure: number or list}} for the report
+    shining  : names of the surfaces that shine by a picture: it is added to their `final`, and their E is 0
     """
 
     names: list
@@ -36,6 +38,7 @@ class TexturedMaps:
     textured: np.ndarray
     pictures: dict = field(default_factory=dict)
     stats: dict = field(default_factory=dict)
+    shining: list = field(default_factory=list)
 
 
 def check(x, path="textured_maps"):
@@ -53,6 +56,8 @@ def check(x, path="textured_maps"):
             raise ValueError(f"E: expected ({m}, 3), finite and >= 0")
         if x.rho_avg.shape != (m, 3) or not ((x.rho_avg >= 0) & (x.rho_avg <= 1)).all():
             raise ValueError(f"rho_avg: expected ({m}, 3), 0 <= rho_avg <= 1")
+        if not set(x.shining) <= set(x.names):
+            raise ValueError("shining: expected names of surfaces with a map")
         if x.textured.shape != (m,) or x.textured.dtype != bool:
             raise ValueError(f"textured: expected ({m},) bool")
     except ValueError as error:
@@ -65,7 +70,8 @@ def save(path, x):
     arrays = {"E": x.E, "rho_avg": x.rho_avg, "textured": x.textured}
     for prefix, one in (("light", x.light), ("final", x.final)):
         arrays.update({f"{prefix}_{name}": getattr(one, name) for name in FIELDS})
-    artefact.write(path, KIND, VERSION, {"names": x.names, "pictures": x.pictures, "stats": x.stats}, arrays)
+    header = {"names": x.names, "pictures": x.pictures, "stats": x.stats, "shining": list(x.shining)}
+    artefact.write(path, KIND, VERSION, header, arrays)
 
 
 def load(path):
@@ -83,6 +89,7 @@ def load(path):
             arrays["textured"],
             header["pictures"],
             header["stats"],
+            header["shining"],
         )
     except KeyError as error:
         raise artefact.ArtefactError(f"{path}: field {error} is missing") from None
@@ -104,4 +111,17 @@ def merge(chunks):
         np.concatenate([c.textured for c in chunks])[order],
         {key: size for c in chunks for key, size in c.pictures.items()},
         {name: figures for c in chunks for name, figures in c.stats.items()},
+        [name for c in chunks for name in c.shining],
     )
+
+
+def reflected(x):
+    """The MapSet of the light alone that a TexturedMaps shows: `final`, and `light` where that holds a picture that
+    shines."""
+    if not x.shining:
+        return x.final
+    shining, final = set(x.shining), x.final
+    own = [x.light if name in shining else final for name in x.names]
+    level = [one.level[k] for k, one in enumerate(own)]
+    values, hidden = ([getattr(one, view)(k) for k, one in enumerate(own)] for view in ("map", "hidden_map"))
+    return mapset.pack(final.surface, final.roots, level, values, hidden)
