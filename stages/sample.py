@@ -64,7 +64,7 @@ def packed(surfaces, base, lit, elements, grids, groups):
         np.concatenate([np.zeros((0, width), np.uint8), *(r.met for r in rows)]),
         np.concatenate([np.zeros((0, 16), bool), *(r.is_hidden for r in rows)]),
         np.concatenate([np.zeros(0, bool), *(e.is_alone for e in elements)]),
-        np.concatenate([np.zeros(0), *(e.area for e in elements)]),
+        np.concatenate([np.zeros((0, POINTS**2)), *(e.area for e in elements)]),
         np.concatenate(
             [np.zeros((0, POINTS**2, groups, 3)), *(e.H_direct.reshape(-1, POINTS**2, groups, 3) for e in elements)]
         ).astype(np.float32),

@@ -38,11 +38,11 @@ def body(args, cost):
     reflects = (np.array(x.role) == "full") & ~np.asarray(x.is_black)
     grids = element_grids(mesh.area, mesh.extent, mesh.is_planar, reflects, chosen["n_elements"])
     chunks = [samples.load(path) for path in args.samples]
-    entries, met, hidden, is_alone, area, H_points = collected(chunks, grids.total, len(x.groups))
+    entries, met, hidden, is_alone, A_points, H_points = collected(chunks, grids.total, len(x.groups))
     surface = np.repeat(np.arange(len(x.names)), grids.n_u * grids.n_v)
     bounces = None if chosen["bounces"] == "converge" else int(chosen["bounces"])
-    F = FormFactors(entries)
-    H_direct = H_points.sum(axis=1) / np.maximum((~hidden).sum(axis=1), 1)[:, None, None]
+    F, area = FormFactors(entries, A_points), A_points.sum(axis=1)
+    H_direct = np.einsum("npgc,np->ngc", H_points, A_points) / np.maximum(area, 1e-300)[:, None, None]
     B_points = (H_points * rho[surface][:, None, None]).reshape(grids.total, POINTS**2, -1)
     first = F.gather_points(B_points, met)
     try:
@@ -87,14 +87,15 @@ def body(args, cost):
 
 
 def collected(chunks, total, groups):
-    """Entries (n, R), the points they meet (n, R), hidden points (n, 16), is_alone (n,), visible area (n,) and direct
-    light at the points (n, 16, G, 3) of all elements, in order.  What meets a hidden point of an element, the far
+    """Entries (n, R), the points they meet (n, R), hidden points (n, 16), is_alone (n,), area of the points (n, 16)
+    and direct light there (n, 16, G, 3) of all elements, in order.  What meets a hidden point of an element, the far
     side of a wall on it, is absorbed.
     """
     width = max((c.entries.shape[1] for c in chunks if len(c.entries)), default=1)
     entries = np.full((total, width), -3, dtype=np.int32)
     met, hidden = np.zeros(entries.shape, dtype=np.uint8), np.ones((total, POINTS**2), dtype=bool)
-    area, H_points, is_alone = np.zeros(total), np.zeros((total, POINTS**2, groups, 3)), np.zeros(total, dtype=bool)
+    area, H_points = np.zeros((total, POINTS**2)), np.zeros((total, POINTS**2, groups, 3))
+    is_alone = np.zeros(total, dtype=bool)
     for c in chunks:
         if len(c.element):
             entries[c.element], met[c.element], hidden[c.element] = c.entries, c.met, c.is_hidden

@@ -6,7 +6,7 @@ import numpy as np
 
 from lib.formats import artefact
 
-KIND, VERSION = "samples", 3
+KIND, VERSION = "samples", 4
 
 
 @dataclass(frozen=True)
@@ -17,8 +17,8 @@ class Samples:
     first (m + 1,) int64 offsets of their lattices in value (N, 3 G) float32 [W/m^2], hidden (N,) bool, noise (N,)
     float32
     element (k,) int32 global numbers; entries (k, R) int32, met (k, R) uint8, is_hidden (k, 16) bool as Rows has them;
-    is_alone (k,) bool as Parts has it; area (k,) float64 visible area in frame units; H_direct (k, 16, G, 3)
-    float32 at the elements' points, 0 where hidden
+    is_alone (k,) bool as Parts has it; area (k, 16) float64 that the elements' points stand for, in frame units, and
+    H_direct (k, 16, G, 3) float32 there, both 0 where hidden
     """
 
     surface: np.ndarray

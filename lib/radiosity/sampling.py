@@ -99,8 +99,8 @@ def base_lattice(world, surfaces, seed, level, shadow_rays):
 
 @dataclass(frozen=True)
 class Elements:
-    """Elements of one surface: rows, is_alone (k,) bool as Parts has it, visible area (k,), direct light at their
-    points H_direct (k, 16, 3 G), 0 where hidden."""
+    """Elements of one surface: rows, is_alone (k,) bool as Parts has it, area (k, 16) that their points stand for and
+    direct light there H_direct (k, 16, 3 G), both 0 where hidden."""
 
     rows: Rows
     is_alone: np.ndarray
@@ -128,7 +128,7 @@ def surface_elements(world, s, seed, grids, R, base):
     found, is_walled = _parts(world, s, on.S + on.N * OFFSET, rows.is_hidden, n_u, n_v)
     rows = without(rows, ~found.keeps & ~rows.is_hidden)
     visible = ~rows.is_hidden
-    area = (by_element(on.density) * visible).mean(axis=1) / (n_u * n_v)
+    area = by_element(on.density) * visible / visible.size
     value, hidden, noise, level = base
     cover = world.cover(s, level)
     light = _bilinear(*(finer(value, hidden) if cover is None else (value, hidden)), u, v)

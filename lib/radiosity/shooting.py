@@ -48,21 +48,27 @@ class Solution:
 
 
 class FormFactors:
-    """The sparse matrix F of rows with entries; escaped, absorbed (n,) the shares that meet no element, met (n,)
+    """The sparse matrix F of rows with entries (n, R); escaped, absorbed (n,) the shares that meet no element, met (n,)
     others.
+
+    area : (n, p) that each of the points of an element stands for, which send R / p rays each: all means are by area.
+        Default: all the same
     """
 
-    def __init__(self, entries):
+    def __init__(self, entries, area=None):
         n, R = entries.shape
         self.n = n
-        self._rays = rays = np.maximum((entries != -3).sum(axis=1), 1)
+        weight = (entries != -3).astype(np.float64)
+        if area is not None:
+            weight *= np.repeat(area, R // area.shape[1], axis=1)
+        self._share = weight = weight / np.where((total := weight.sum(axis=1)) > 0, total, 1.0)[:, None]
         self._meeting = row, column = np.nonzero(entries >= 0)
         self._met = target = entries[row, column].astype(np.int64)
-        pair, count = np.unique(row * np.int64(n) + target, return_counts=True)
+        pair, which = np.unique(row * np.int64(n) + target, return_inverse=True)
         self._row, self._column = pair // max(n, 1), pair % max(n, 1)
-        self._F = count / rays[self._row]
-        self.escaped = (entries == -1).sum(axis=1) / rays
-        self.absorbed = (entries == -2).sum(axis=1) / rays
+        self._F = np.bincount(which.ravel(), weight[row, column], len(pair))
+        self.escaped = np.where(entries == -1, weight, 0.0).sum(axis=1)
+        self.absorbed = np.where(entries == -2, weight, 0.0).sum(axis=1)
         self.met = 1 - self.escaped - self.absorbed
 
     def gather(self, B):
@@ -74,8 +80,8 @@ class FormFactors:
         (n, C).
         """
         row, ray = self._meeting
-        sums = [np.bincount(row, c, minlength=self.n) for c in B[self._met, met[row, ray]].T]
-        return np.stack(sums, axis=1) / self._rays[:, None]
+        found = B[self._met, met[row, ray]] * self._share[row, ray, None]
+        return np.stack([np.bincount(row, c, minlength=self.n) for c in found.T], axis=1)
 
     def scatter(self, power):
         """sum_i F_ij power_i for power (n, C): (n, C)."""

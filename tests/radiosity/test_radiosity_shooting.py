@@ -295,3 +295,16 @@ def test_no_finer_light_changes_nothing():
     assert solve(H_direct, rho, np.ones(6), F, first=same[:, None]).H == pytest.approx(
         solve(H_direct, rho, np.ones(6), F).H
     )
+
+
+def test_rays_count_by_the_area_their_point_stands_for():
+    """Two elements of two points, each sending two rays: by hand."""
+    entries = np.array([[1, -1, -2, 1], [0, 0, -3, -3]])
+    F = FormFactors(entries, np.array([[3.0, 1.0], [1.0, 0.0]]))
+    assert F.escaped == pytest.approx([3 / 8, 0]) and F.absorbed == pytest.approx([1 / 8, 0])
+    B = np.array([[5.0], [7.0]])
+    assert F.gather(B) == pytest.approx(np.array([[7 / 2], [5]]))
+    met = np.array([[0, 0, 0, 1], [0, 1, 0, 0]])
+    B = np.array([[[2.0], [4.0]], [[10.0], [30.0]]])
+    assert F.gather_points(B, met) == pytest.approx(np.array([[(3 * 10 + 1 * 30) / 8], [3]]))
+    assert F.scatter(np.array([[1.0], [1.0]])) == pytest.approx(np.array([[1], [1 / 2]]))

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lib.formats import artefact, solution
+from lib.formats import artefact, samples, solution
 from lib.nurbs.shape import transformed
 from stages import shoot
 from tests.rooms import Baked, cube, scene_of
@@ -136,10 +136,10 @@ def test_arrays_of_other_names_are_refused(tmp_path, capsys):
     """A file of the right kind whose arrays are not those of the contract: written by other code."""
     bake = sampled(tmp_path, lit_room())
     path = bake.path("samples", 0)
-    header, arrays = artefact.read(path, "samples", 3)
+    header, arrays = artefact.read(path, "samples", samples.VERSION)
     header.pop("kind"), header.pop("version")
     arrays["penumbra"] = arrays.pop("hidden")
-    artefact.write(path, "samples", 3, header, arrays)
+    artefact.write(path, "samples", samples.VERSION, header, arrays)
     assert bake.shoot() == 1
     assert path in capsys.readouterr().err
 
