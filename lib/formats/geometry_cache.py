@@ -15,11 +15,11 @@ from lib.formats import artefact, surface_arrays
 from lib.formats.artefact import ArtefactError
 from lib.formats.patches import GeometryFile, Patch
 
-KIND, VERSION = "geometry", 1
+KIND, VERSION = "geometry", 2
 CODE = ("lib/formats", "lib/surfaces", "lib/nurbs")
 ROOT = Path(__file__).resolve().parents[2]
 MOST = 10_000  # files of a folder that are looked at
-FACTS = ("number", "flip", "labels", "material", "solid", "shape")
+FACTS = ("number", "flip", "labels", "material", "solid", "shape", "area")
 KEPT = 16  # readings in one folder, the newest
 
 

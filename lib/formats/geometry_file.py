@@ -2,6 +2,7 @@
 
 import hashlib
 import re
+from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote
 
@@ -36,11 +37,14 @@ def read(path, file, name, only=None, trimmed="keep", root=None, cache=None):
     if cache is None or path.suffix.lower() not in SLOW or not path.is_file():
         return _read(path, file, name, only, trimmed, root)
     from lib.formats import geometry_cache
+    from lib.surfaces.measure import area
 
     key = geometry_cache.key(path, path.read_bytes(), *how)
     content = geometry_cache.load(cache, key)
     if content is None:
         content = _read(path, file, name, only, trimmed, root)
+        measured = [replace(patch, area=area(patch.surface)) for patch in content.patches]
+        content = replace(content, patches=measured)
         geometry_cache.save(cache, key, content)
     return content
 

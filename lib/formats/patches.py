@@ -21,6 +21,7 @@ class Patch:
     labels : texts that the entry's `only` may match (layer, object name, number)
     material : key of GeometryFile.materials, or None
     solid : part of a closed body (True), of an open sheet (False), or nobody said (None)
+    area : of the surface [square of the file's unit], None where it was not measured yet
     shape : surfaces with the same text are one mesh moved about: the same triangles and corners in the same order
     """
 
@@ -31,6 +32,7 @@ class Patch:
     material: str | None = None
     solid: bool | None = None
     shape: str | None = None
+    area: float | None = None
 
 
 @dataclass(frozen=True)

@@ -212,7 +212,7 @@ def _placed(entry, index, parts, total, to_units, own, areas, mistakes, where):
         mirrored = np.linalg.slogdet(M[:3, :3])[0] < 0
         for part in parts:
             full = names.patch(name, part.number, total) if total else name
-            made = _world(part.surface, M, full, index, areas, mistakes, where)
+            made = _world(part, M, full, index, areas, mistakes, where)
             if made is not None:
                 flip = bool(part.flip) ^ bool(mirrored) ^ bool(entry.get("flip", False))
                 facts = (material_of.get(part.material), part.solid, part, M)
@@ -220,8 +220,9 @@ def _placed(entry, index, parts, total, to_units, own, areas, mistakes, where):
     return result
 
 
-def _world(part, M, name, index, areas, mistakes, where):
+def _world(patch, M, name, index, areas, mistakes, where):
     """(surface in metres, its area), or None with the reason noted; `areas` keeps those of the parts by identity."""
+    part = patch.surface
     file, line = where(("geometry", index))
     try:
         surface = part if np.array_equal(M, np.eye(4)) else transformed(part, M)
@@ -238,7 +239,8 @@ def _world(part, M, name, index, areas, mistakes, where):
         found = area(surface)
     else:  # copies by the thousand: one integral
         if id(part) not in areas:
-            areas[id(part)] = (area(part), part)  # the part too: an identity lasts as long as what it names
+            own = area(part) if patch.area is None else patch.area
+            areas[id(part)] = (own, part)  # the part too: an identity lasts as long as what it names
         found = areas[id(part)][0] * scale**2
     rounding = 16 * np.finfo(np.float64).eps * float(np.abs(P).max()) * size
     if not found > max(FLAT * size * size, rounding):

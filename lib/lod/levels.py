@@ -23,6 +23,7 @@ from lib.surfaces.mesh import Mesh
 DEVIATION = 1e-4  # of the frame: the finest level, where none is named
 SLIDE = 8  # a texture may slide as many tolerances, or tessellate.SLIDE of the surface's size if that is more
 COARSEST, FINEST = 10.0, 1e-9  # tolerances searched, in frames
+LEAST_COUNT = 1.02  # times the least count there is, which is as good as that
 ATTEMPTS = 8  # of asking for fewer triangles where more came out than were predicted
 LESSONS = 1  # times a level by count is cut again after measuring finer what came out far off
 MOST = 4_000_000  # triangles of one level
@@ -120,16 +121,18 @@ class Scene:
             tolerance = self.tolerance_for(ask, pieces)
             patches = pieces.cut(*self.asked_of(tolerance))
             count = self.count(patches)
-            if count <= asked or tolerance == COARSEST:
+            if count <= asked or ask <= self.predicted(COARSEST, pieces):
                 break
             ask = min(int(ask * asked / count), ask - 1)
         return tolerance, patches
 
     def tolerance_for(self, asked, pieces=None):
-        """The smallest tolerance found by bisection whose count is at most `asked`; the coarsest if none is."""
+        """The smallest tolerance found by bisection whose count is at most `asked`, or hardly above the least there is.
+
+        A mesh of many pieces can not be thinned below some count: there nothing is won by a coarser tolerance.
+        """
         low, high = np.log(FINEST), np.log(COARSEST)
-        if self.predicted(COARSEST, pieces) > asked:
-            return COARSEST
+        asked = max(asked, int(LEAST_COUNT * self.predicted(COARSEST, pieces)))
         for _ in range(40):
             middle = (low + high) / 2
             if self.predicted(np.exp(middle), pieces) <= asked:

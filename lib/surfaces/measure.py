@@ -155,7 +155,7 @@ def _plane(P):
 
 
 def map_domain(surface):
-    """(u0, u1, v0, v1) that the map of a surface covers, in the whole surface's [0, 1] x [0, 1]: a trimmed one's box."""
+    """(u0, u1, v0, v1) that the map of a surface covers of the whole surface's [0, 1] x [0, 1]: a trimmed one's box."""
     return tuple(float(x) for x in surface.box) if isinstance(surface, TrimmedSurface) else (0.0, 1.0, 0.0, 1.0)
 
 
