@@ -5,7 +5,7 @@ import numpy as np
 from benchmarks.hard_cases.bench import DENSE, Figure, crossings, looked_up, parallel_rectangle, rms
 from benchmarks.hard_cases.shadows import below_sheet, lamp, sheet
 from lib.nurbs.shape import transformed
-from tests.rooms import cube
+from tests.rooms import cube, shining
 from tests.shapes import box, rectangle
 
 FLOOR = [-1.0, -1, 0], [2.0, 0, 0], [0.0, 2, 0]
@@ -104,4 +104,30 @@ def dim_room(bench):
         yield Figure(what + f"{name}, that error over the default's", "less", 0.85, own[name] / own["default"])
 
 
-CASES = [unlit_and_black, two_sides, many_lamps, dim_room]
+def textured_emitter(bench):
+    """A lamp of 0.8 x 0.8 that shines by a picture of 16 x 16 uneven squares, each known in closed form; direct light
+    sees 8 x 8 parts of it at most."""
+    n, side = 16, 0.8 / 16
+    colour = np.random.default_rng(5).random((n, n, 3)) ** 3  # row 0 the picture's top, y = 0.4; columns against x
+    picture = colour.repeat(32, axis=0).repeat(32, axis=1).astype(np.float32)
+    row, column = (axis.ravel() for axis in np.indices((n, n)))
+    corner = np.stack([0.4 - side * (column + 1), 0.4 - side * (row + 1)], axis=1)
+    table = [-0.3, -0.3], [0.3, 0.3], 0.3
+    cases = (
+        ("1 above the floor", 1.0, False, 0.01),
+        ("and a table", 1.0, True, 0.015),
+        ("0.2 above it", 0.2, False, 0.05),
+    )
+    for name, height, has_table, asked in cases:
+        lamp = shining(rectangle([0.4, -0.4, height], [-0.8, 0, 0], [0, 0.8, 0]), picture, is_black=True)
+        scene = {"floor": (rectangle(*FLOOR), {}), "lamp": lamp} | ({"table": sheet(*table)} if has_table else {})
+        H = bench.maps(scene, {"floor": 0.5, "lamp": 0.0, "table": 0.0}, bounces=1)["floor"][0]
+        H = looked_up(H, (DENSE, DENSE))
+        x = crossings(H.shape, *FLOOR)[..., :2]
+        squares = ((c, c + side) for c in corner)
+        F = [below_sheet(x, *table, *c) if has_table else parallel_rectangle(x, *c, height) for c in squares]
+        error = rms(H, np.tensordot(F, colour.reshape(-1, 3), (0, 0)))
+        yield Figure(f"textured emitter, 0.8 wide, {name}, RMSE", "sum over the picture's squares", asked, error)
+
+
+CASES = [unlit_and_black, two_sides, many_lamps, dim_room, textured_emitter]

@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks import accuracy
 from benchmarks.hard_cases.bench import Bench
+from lib.maps import emission
 from lib.radiosity import form_factors, gather, rows, sampling, shooting
 from lib.visibility import hemisphere, hidden
 from stages import shoot, tessellate
@@ -91,7 +92,20 @@ def through_walls(patch):
     )
 
 
+def even_pictures(patch):
+    """A picture's mean shines everywhere."""
+    patch.setattr("lib.maps.emission.merged", lambda mean, area, tolerance: (np.array([[0, 1, 0, 1.0]]), mean[:1, 0]))
+
+
+def mirrored_pictures(patch):
+    """Parts of a picture lie on the other side."""
+    merged = emission.merged
+    patch.setattr("lib.maps.emission.merged", lambda mean, area, tolerance: merged(mean[:, ::-1], area, tolerance))
+
+
 BROKEN = {
+    even_pictures: "textured_emitter",
+    mirrored_pictures: "textured_emitter",
     no_receiver_cosine: "spheres",
     no_emitter_cosine: "lamps",
     no_lift: "own_tessellation",
