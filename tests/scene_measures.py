@@ -17,6 +17,7 @@ from lib.surfaces.mesh import Mesh
 from lib.surfaces.trimmed import TrimmedSurface
 
 SCENES = Path(__file__).parents[1] / "data" / "scenes"
+FLOAT, SINK = 2e-5, 2e-4  # an object may hang 0.02 mm above what it stands on, or sink 0.2 mm into it: neither shows
 GAUSS = np.polynomial.legendre.leggauss(8)  # exact for polynomials of degree 15 in each knot span
 
 

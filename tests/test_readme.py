@@ -88,7 +88,7 @@ def test_named_files_exist():
 def test_every_stage_is_listed_in_order():
     listed = re.search(r"The stages, in order: (.*?)\. Each", README, re.DOTALL)[1]
     listed = [name for name in re.sub(r"\([^)]*\)", "", listed).replace("\n", " ").replace(" ", "").split(",") if name]
-    drawn = re.findall(r"^rule (\w+):", (ROOT / "Snakefile").read_text(encoding="utf-8"), re.MULTILINE)
+    drawn = re.findall(r"^\s*rule (\w+):", (ROOT / "Snakefile").read_text(encoding="utf-8"), re.MULTILINE)
     order = list(dict.fromkeys(re.sub("_(in)?direct$", "", name) for name in drawn if name != "all"))
     assert listed == order
     assert not [name for name in listed if not (ROOT / "stages" / f"{name}.py").exists()]

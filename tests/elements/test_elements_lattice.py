@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lib.elements.lattice import INSIDE, OFFSET, Lattice, receivers, roots_of
-from lib.nurbs.evaluate import normal, point
+from lib.nurbs.evaluate import point
 from lib.nurbs.shape import collapsed_sides, is_closed
 from tests.shapes import CIRCLE, CIRCLE_KNOTS, CIRCLE_WEIGHTS, cylinder, disc, rectangle, revolved, sphere, triangle
 from tests.tolerances import EXACT
