@@ -59,7 +59,7 @@ class Materials:
         """One sentence per kind of thing that is not taken over."""
         clamped = [self._names[k] for k, is_outside in self._clamped.items() if is_outside]
         kinds = (
-            (self._glowing, "emission textures are not read; no light comes from"),
+            (self._glowing, "emission textures that can not be used; no light comes from"),
             (self._unlit, "unlit materials are lit like others:"),
             (self._see_through, "see-through materials are opaque:"),
             (self._unplaced, "without texture coordinates, the picture's corner is taken:"),
@@ -92,10 +92,13 @@ class Materials:
         emission = np.maximum(numbers(material, "emissiveFactor", 3, [0.0] * 3), 0.0)
         strength = numbers({"x": [table(extensions, STRENGTH).get("emissiveStrength", 1.0)]}, "x", 1, None)[0]
         if emission.max() > 0 and strength > 0:
-            if "emissiveTexture" in material:
-                self._glowing[name] = None
-            else:
+            path = self._emission_texture(index, material) if "emissiveTexture" in material else None
+            if path:
+                found["emission_texture"] = path
+            if path or "emissiveTexture" not in material:
                 found["emission"] = (math.pi * strength * emission).tolist()
+            else:
+                self._glowing[name] = None
         if material.get("doubleSided") is True:
             found["two_sided"] = "auto"
         if UNLIT in extensions:
@@ -103,6 +106,18 @@ class Materials:
         if material.get("alphaMode") == "BLEND" or table(extensions, "KHR_materials_transmission"):
             self._see_through[name] = None
         self.made[name] = found
+
+    def _emission_texture(self, index, material):
+        """Path or `embedded:KEY` of the picture that multiplies the emission; None if it lies on the surface otherwise
+        than the base texture does, for a surface has one set of coordinates."""
+        own = self._textures.pop(index, None)
+        path = self._texture(index, table(material, "emissiveTexture"))
+        found = self._textures.get(index)
+        if own is not None:
+            self._textures[index] = own
+            if found and not (own[0] == found[0] and np.array_equal(own[1], found[1])):
+                return None
+        return path
 
     def _texture(self, index, info):
         """Path or `embedded:KEY` of a texture's picture, or None."""

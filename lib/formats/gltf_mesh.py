@@ -88,7 +88,8 @@ def _content(container, placed, skipped, report, only):
         skipped[f"surface without an area ({listed(flat)})"] += len(flat)
     used = {patch.material for patch in patches}
     kept = {name: found for name, found in materials.made.items() if name in used}
-    keys = {found.get("texture", "").removeprefix("embedded:") for found in kept.values()}
+    named = [found.get(field, "") for found in kept.values() for field in ("texture", "emission_texture")]
+    keys = {written.removeprefix("embedded:") for written in named}
     parts = [f"{n} {what if n == 1 else PLURAL.get(what, what)}" for what, n in sorted(skipped.items())]
     notes = [f"skipped: {', '.join(parts)}"] if parts else []
     notes += shapes.dropped.sentences() + materials.notes() + container.files.notes()

@@ -4,7 +4,7 @@ Kd is taken as linear reflectance: the format (Wavefront, Advanced Visualizer, a
 files made from measured values (the Cornell box: 0.725 0.71 0.68) give them linear.  A program that writes what its
 colour picker shows writes sRGB numbers; nothing in the file says so.  A texture is to be multiplied by Kd; a grey Kd
 beside a texture counts as 1, because exporters leave their default there (0, 0.588, 0.64, 0.8).  Ke is a radiance;
-times pi it is the exitance [W/m2].
+times pi it is the exitance [W/m2], where map_Ke is white if there is one; a map_Ke without Ke has Ke 1.
 """
 
 import math
@@ -54,7 +54,7 @@ def parse(data, folder, pictures):
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     text = re.sub(r"\\[ \t]*\r?\n", " ", text)
-    materials, faults, current, glowing = {}, [], None, []
+    materials, faults, current, dark = {}, [], None, []
     for number, line in enumerate(text.splitlines(), 1):
         word, _, rest = line.replace("\t", " ").strip().partition(" ")
         key, rest = word.lower(), rest.strip()
@@ -75,10 +75,10 @@ def parse(data, folder, pictures):
     made = {}
     for name, found in materials.items():
         made[name] = _material(found, folder, pictures)
-        if "map_ke" in found and max(found.get("ke", (1.0,))) > 0:
-            glowing.append(name)
-    if glowing:
-        faults.append(f"emission textures are not read; no light comes from {listed(glowing)}")
+        if "map_ke" in found and max(found.get("ke", (1.0,))) > 0 and "emission" not in made[name]:
+            dark.append(name)
+    if dark:
+        faults.append(f"emission textures that can not be used; no light comes from {listed(dark)}")
     return made, faults
 
 
@@ -86,11 +86,9 @@ def _material(found, folder, pictures):
     """A material as under `materials` of scene.yaml from the lines of one `newmtl`."""
     colour = found.get("kd", (0.8, 0.8, 0.8) if "ke" not in found else (0.0, 0.0, 0.0))
     material = {"reflectance": [min(c, 1.0) for c in colour]}
-    if "ke" in found and max(found["ke"]) > 0 and "map_ke" not in found:
-        material["emission"] = [math.pi * c for c in found["ke"]]
     if "map_kd" in found:
         name, scale = found["map_kd"]
-        path = pictures.usable((PurePosixPath(folder) / name.replace("\\", "/")).as_posix() if name else "")
+        path = _usable(name, folder, pictures)
         if path:
             material["texture"] = path
             if scale != (1.0, 1.0):
@@ -99,7 +97,28 @@ def _material(found, folder, pictures):
                 del material["reflectance"]
         else:
             material["reflectance"] = [UNSEEN] * 3 if len(set(colour)) == 1 else [UNSEEN * c for c in colour]
-    return material
+    return material | _emission(found, material, folder, pictures)
+
+
+def _emission(found, material, folder, pictures):
+    """The part of a material that shines: Ke times pi, its picture where it has one.  A picture that repeats otherwise
+    than the base texture has no place on the surface."""
+    Ke = found.get("ke", (1.0,) * 3 if "map_ke" in found else (0.0,))
+    if max(Ke) <= 0:
+        return {}
+    emission = {"emission": [math.pi * c for c in Ke]}
+    if "map_ke" not in found:
+        return emission
+    name, scale = found["map_ke"]
+    path = _usable(name, folder, pictures)
+    if not path or ("texture" in material and list(scale) != material.get("repeat", [1.0, 1.0])):
+        return {}
+    repeat = {} if scale == (1.0, 1.0) else {"repeat": list(scale)}
+    return {**emission, "emission_texture": path, **repeat}
+
+
+def _usable(name, folder, pictures):
+    return pictures.usable((PurePosixPath(folder) / name.replace("\\", "/")).as_posix() if name else "")
 
 
 def _colour(rest):

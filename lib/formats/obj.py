@@ -21,6 +21,7 @@ ARRAYS = ("v", "vt", "vn", "f")
 SILENT = ("s", "l", "p", "lod", "bevel", "c_interp", "d_interp", "shadow_obj", "trace_obj", "usemap", "maplib", "mg")
 FREE_FORM = tuple("curv curv2 surf vp cstype deg bmat step parm trim hole scrv sp end".split())
 MOST_LABELS = 1000
+PICTURED = {"texture", "emission_texture"}  # fields of a material that name pictures
 
 
 def read(data, report, only=None, folder="."):
@@ -61,13 +62,15 @@ def read(data, report, only=None, folder="."):
     if absent and materials:
         notes.append(f"materials that no library defines, grey instead: {listed(sorted(absent))}")
     kept = {name: material for name, material in materials.items() if name in used}
-    unused = {m["texture"] for m in kept.values() if "texture" in m and not _has_texture(patches, kept, m)}
-    for path in sorted(unused):
+    bare = [m for m in kept.values() if PICTURED & set(m) and not _has_texture(patches, kept, m)]
+    for path in sorted({m[field] for m in bare for field in PICTURED & set(m)}):
         pictures.fault(path, "the mesh has no texture coordinates")
-    for material in kept.values():
-        if material.get("texture") in unused:
-            material.pop("texture")
+    for material in bare:
+        if material.pop("texture", None):
             material.setdefault("reflectance", [UNSEEN] * 3)
+        if material.pop("emission_texture", None):
+            material.pop("emission")
+        material.pop("repeat", None)
     return GeometryFile(patches, total, notes=notes + pictures.notes(), materials=kept)
 
 

@@ -75,14 +75,9 @@ class _Brought:
             material = dict(material)
             if "reflectance" in material:
                 material["reflectance"] = np.minimum(material["reflectance"], BRIGHTEST).tolist()
-            written = material.get("texture", "")
-            if written.startswith("embedded:"):
-                data = content.pictures[written.removeprefix("embedded:")]
-                key = hashlib.sha256(data).hexdigest()[:16]
-                self.pictures[key] = data
-                material["texture"] = f"embedded:{key}"
-            elif written:
-                material["texture"] = str(folder / written)
+            for which in ("texture", "emission_texture"):
+                if which in material:
+                    material[which] = self._picture(material[which], folder, content)
             own = names.canonical(name) if names.complaint(name) is None else "material"
             full, number = own, 1
             while self.materials.get(full, material) != material:
@@ -91,6 +86,15 @@ class _Brought:
             self.materials[full] = material
             names_of[name] = full
         return names_of
+
+    def _picture(self, written, folder, content):
+        """What the scene calls a picture of a file in `folder`: its path, or embedded:KEY by its content."""
+        if not written.startswith("embedded:"):
+            return str(folder / written)
+        data = content.pictures[written.removeprefix("embedded:")]
+        key = hashlib.sha256(data).hexdigest()[:16]
+        self.pictures[key] = data
+        return f"embedded:{key}"
 
 
 def load(entries, units, folder, file, where=None, up="z", cache=None):

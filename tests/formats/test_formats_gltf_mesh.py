@@ -229,7 +229,7 @@ def test_texture_transform_is_baked_in(read):
 def test_textures_that_do_not_repeat_and_lights_without_pictures_are_noted(read):
     extra = {"samplers": [{"wrapS": 33071}], "cameras": [{}], "animations": [{}]}
     wide = {"extensions": {"KHR_texture_transform": {"scale": [2, 2]}}}
-    look = {"emissiveTexture": {"index": 0}, "emissiveFactor": [1, 1, 1], "alphaMode": "BLEND"}
+    look = {"emissiveTexture": {"index": 0, "texCoord": 0}, "emissiveFactor": [1, 1, 1], "alphaMode": "BLEND"}
     doc = textured(wide, extra=extra, extensions={"KHR_materials_unlit": {}}, **look)
     doc.json["textures"][0]["sampler"] = 0
     doc.json["nodes"] += [{"camera": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}}]
@@ -237,12 +237,24 @@ def test_textures_that_do_not_repeat_and_lights_without_pictures_are_noted(read)
     content = read(doc, **{"wall one_DOT_png": PNG})
     assert content.notes == [
         "skipped: 1 animation, 1 camera, 1 light (KHR_lights_punctual)",
-        "emission textures are not read; no light comes from paint",
+        "emission textures that can not be used; no light comes from paint",
         "unlit materials are lit like others: paint",
         "see-through materials are opaque: paint",
         "textures that do not repeat in the file repeat here: paint",
     ]
     assert "emission" not in content.materials["paint"]
+
+
+def test_emission_textures(read):
+    """The picture multiplies the factor; alone, it brings its own coordinates."""
+    strength = {"KHR_materials_emissive_strength": {"emissiveStrength": 10}}
+    look = {"emissiveTexture": {"index": 0, "texCoord": 1}, "emissiveFactor": [1, 0.5, 0], "extensions": strength}
+    doc = textured(**look)
+    del doc.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"]
+    content = read(doc, **{"wall one_DOT_png": PNG})
+    assert content.materials["paint"]["emission_texture"] == "wall one.png"
+    assert content.materials["paint"]["emission"] == pytest.approx([10 * math.pi, 5 * math.pi, 0])
+    assert content.patches[0].surface.T.tolist() == [[[0, 1], [1, 1], [0, 0]]] and content.notes == []
 
 
 @pytest.mark.parametrize("way", ["view", "data"])

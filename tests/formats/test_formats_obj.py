@@ -141,10 +141,29 @@ def test_missing_libraries_and_materials_are_noted(read):
     assert content.materials == {}
 
 
-def test_emission_textures_do_not_glow_all_over(read):
-    content = read("mtllib a.mtl\n" + SQUARE + "usemtl x\nf 1 2 3\n", a_DOT_mtl=b"newmtl x\nKe 9 9 9\nmap_Ke e.png\n")
-    assert "emission" not in content.materials["x"]
-    assert content.notes == ["a.mtl: emission textures are not read; no light comes from x"]
+def test_emission_textures(read):
+    """With Ke, without it (1), beside a base texture, and one that repeats otherwise."""
+    mtl = b"newmtl a\nKe 9 9 3\nmap_Ke -s 2 3 -clamp on e.png\nnewmtl b\nmap_Ke e.png\nmap_Kd w.png\n"
+    mtl += b"newmtl c\nKe 1 1 1\nmap_Kd w.png\nmap_Ke -s 2 2 e.png\nnewmtl d\nKe 0 0 0\nmap_Ke e.png\n"
+    text = "mtllib a.mtl\n" + SQUARE + "vt 0 0\nvt 1 0\nvt 1 1\n"
+    text += "".join(f"usemtl {name}\nf 1/1 2/2 3/3\n" for name in "abcd")
+    content = read(text, **{"a_DOT_mtl": mtl, "e_DOT_png": b"\x89PNG", "w_DOT_png": b"\x89PNG"})
+    nine = pytest.approx([9 * math.pi, 9 * math.pi, 3 * math.pi])
+    a = {"reflectance": [0.0] * 3, "emission": nine, "emission_texture": "e.png", "repeat": [2.0, 3.0]}
+    assert content.materials["a"] == a
+    one = pytest.approx([math.pi] * 3)
+    assert content.materials["b"] == {"texture": "w.png", "emission": one, "emission_texture": "e.png"}
+    assert content.materials["c"] == {"texture": "w.png"} and "emission" not in content.materials["d"]
+    assert content.notes == ["a.mtl: emission textures that can not be used; no light comes from c"]
+
+
+@pytest.mark.parametrize("file", ["gone.png", "e.png"])
+def test_emission_textures_without_a_place_do_not_glow_all_over(read, file):
+    """The picture is not there, or the mesh has no texture coordinates."""
+    mtl = f"newmtl x\nKe 9 9 9\nmap_Ke {file}\n".encode()
+    content = read("mtllib a.mtl\n" + SQUARE + "usemtl x\nf 1 2 3\n", **{"a_DOT_mtl": mtl, "e_DOT_png": b"\x89PNG"})
+    assert content.materials["x"] == {"reflectance": [0.0] * 3}
+    assert file in content.notes[-1]
 
 
 @pytest.mark.parametrize("text, what", [

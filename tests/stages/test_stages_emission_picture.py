@@ -1,5 +1,6 @@
 """A scene whose lamps shine by pictures, from scene.yaml to the exported textures, through the stages' doors."""
 
+import base64
 import json
 from types import SimpleNamespace
 
@@ -158,3 +159,56 @@ def test_refusals(tmp_path, change, said):
     with pytest.raises(Refusal) as caught:
         preflight.load(folder, None, tmp_path / "results")
     assert said in str(caught.value) and str(caught.value).startswith(str(folder)), str(caught.value)
+
+
+def screen_gltf(png):
+    """A .gltf of a square of two triangles, 1 m wide, facing down at height 1 (y up), with an emission picture inside."""
+    V = np.array([[-0.5, 1, -0.5], [0.5, 1, -0.5], [0.5, 1, 0.5], [-0.5, 1, 0.5]], "<f4")
+    T, F = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], "<f4"), np.array([0, 1, 2, 0, 2, 3], "<u4")
+    parts, views, at = [V.tobytes(), T.tobytes(), F.tobytes()], [], 0
+    for part in parts:
+        views.append({"buffer": 0, "byteOffset": at, "byteLength": len(part)})
+        at += len(part)
+    uri = lambda kind, data: f"data:{kind};base64,{base64.b64encode(data).decode()}"  # noqa: E731
+    kinds = ((5126, 4, "VEC3"), (5126, 4, "VEC2"), (5125, 6, "SCALAR"))
+    shine = {"emissiveFactor": [1, 1, 1], "emissiveTexture": {"index": 0}}
+    document = {
+        "asset": {"version": "2.0"},
+        "scenes": [{"nodes": [0]}],
+        "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [{"attributes": {"POSITION": 0, "TEXCOORD_0": 1}, "indices": 2, "material": 0}]}],
+        "materials": [{"name": "shine", "pbrMetallicRoughness": {"baseColorFactor": [0, 0, 0, 1]}, **shine}],
+        "textures": [{"source": 0}],
+        "images": [{"uri": uri("image/png", png)}],
+        "buffers": [{"byteLength": at, "uri": uri("application/octet-stream", b"".join(parts))}],
+        "bufferViews": views,
+        "accessors": [
+            {"bufferView": k, "componentType": c, "count": n, "type": t} for k, (c, n, t) in enumerate(kinds)
+        ],
+    }
+    return json.dumps(document)
+
+
+def test_a_mesh_file_shines_by_a_picture_inside_it(tmp_path):
+    """Left half red, right half blue; E is pi times the factor times the picture's mean."""
+    room = written(tmp_path / "room")
+    (room / "screen.gltf").write_text(screen_gltf((room / "half.png").read_bytes()))
+    head = "- {name: floor, rectangle: {origin: [-1, -1, 0], u: [2, 0, 0], v: [0, 2, 0]}}\n"
+    body = SCENE[SCENE.index("bake:") :]
+    (room / "scene.yaml").write_text(f"geometry:\n{head}- {{file: screen.gltf, name: screen}}\n{body}")
+    baked = run(room, tmp_path / "results")
+    (k,) = baked.scene.glow
+    assert baked.scene.E[k] == pytest.approx([np.pi / 2, 0, np.pi / 2], rel=0.01)
+    floor = shown(baked, "floor")
+    w = floor.shape[1]
+    left, right = floor[:, : w // 4].mean(axis=(0, 1)), floor[:, -(w // 4) :].mean(axis=(0, 1))
+    assert left[0] > 1.3 * right[0] and right[2] > 1.3 * left[2]
+    parts, textures = exported.load(baked.out / "scene_LOD0.gltf")
+    part = next(part for part in parts if part.name == baked.scene.names[k])
+    for x, colour in ((-0.4, [0.5, 0, 0]), (0.4, [0, 0, 0.5])):  # emission pi / pi times the exposure, by position
+        a, b, c = (part.ST[part.F[0, n]] for n in range(3))
+        A, B, C = (part.V[part.F[0, n]] for n in range(3))
+        where = np.linalg.lstsq(np.stack([B - A, C - A], axis=1), [x, 1, 0] - A, rcond=None)[0]
+        s, t = a + where[0] * (b - a) + where[1] * (c - a)
+        rgb = textures[part.texture].rgb
+        assert rgb[int(t * rgb.shape[0]), int(s * rgb.shape[1])] == pytest.approx(colour, abs=0.02)
