@@ -162,7 +162,7 @@ def test_refusals(tmp_path, change, said):
 
 
 def screen_gltf(png):
-    """A .gltf of a square of two triangles, 1 m wide, facing down at height 1 (y up), with an emission picture inside."""
+    """A .gltf of a square of two triangles, 1 m wide, facing down at height 1 (y up), its emission picture inside."""
     V = np.array([[-0.5, 1, -0.5], [0.5, 1, -0.5], [0.5, 1, 0.5], [-0.5, 1, 0.5]], "<f4")
     T, F = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], "<f4"), np.array([0, 1, 2, 0, 2, 3], "<u4")
     parts, views, at = [V.tobytes(), T.tobytes(), F.tobytes()], [], 0
