@@ -77,7 +77,7 @@ def without_quality(tree):
     """Plain dict of one source's checked settings with bake.quality replaced by the tolerance it stands for.
 
     >>> without_quality({"bake": {"quality": "final"}})
-    {'bake': {'tolerance': 0.004}}
+    {'bake': {'tolerance': 0.003}}
     """
     tree = _plain(tree)
     quality = (tree.get("bake") or {}).pop("quality", None)
