@@ -6,11 +6,13 @@ tangent frame is that of Duff et al. 2017, which has no singular direction.
 
 import numpy as np
 
+LEVEL = -1e-5  # z of a normal below which the frame is the other one: not 0, where rounding would choose it
+
 
 def tangent_frames(N):
     """Orthonormal rows T, U, N for unit normals N (m, 3): (m, 3, 3)."""
     x, y, z = N[:, 0], N[:, 1], N[:, 2]
-    sign = np.where(z < 0, -1.0, 1.0).astype(N.dtype)
+    sign = np.where(z < LEVEL, -1.0, 1.0).astype(N.dtype)
     a = -1 / (sign + z)
     b = x * y * a
     T = np.stack([1 + sign * x * x * a, sign * b, -sign * x], axis=1)
@@ -53,7 +55,7 @@ def cosine_direction_each(N, points):
     x, y, z = N.T
     r, phi = np.sqrt(points[:, 0]), np.float32(2 * np.pi) * points[:, 1]
     t, u, n = r * np.cos(phi), r * np.sin(phi), np.sqrt(np.maximum(1 - points[:, 0], np.float32(1e-12)))
-    sign = np.where(z < 0, np.float32(-1), np.float32(1))
+    sign = np.where(z < LEVEL, np.float32(-1), np.float32(1))
     a = -1 / (sign + z)
     b = x * y * a
     D = np.empty((len(N), 3), dtype=np.float32)
