@@ -12,7 +12,7 @@ import numpy as np
 
 from lib import door
 from lib.formats import casters, samples, scene, solution, trees
-from lib.radiosity.quality import gather_rays
+from lib.radiosity.quality import LOOKUPS, gather_rays
 from lib.radiosity.refine import error_of, lookup_table, rays_of_surfaces, refine_direct, refine_indirect
 from lib.radiosity.thresholds import own_light, own_share, thresholds
 from lib.radiosity.world import World
@@ -60,7 +60,8 @@ def body(args, cost):
         top, base = chosen["top"], chosen["base_indirect"]
         smallest = chosen["smallest_cell"]
         done = refine_indirect(world, mine, table, solved, chosen["seed"], tau, top, base, rays, smallest)
-    trees.save(args.out, args.half, {int(s): stored(t, world.n_groups) for s, t in done.items()}, cost.notes)
+    lookups = LOOKUPS * float(np.max(solved.mean_H)) if args.half == "indirect" else 0.0
+    trees.save(args.out, args.half, {int(s): stored(t, world.n_groups, lookups) for s, t in done.items()}, cost.notes)
     cost.rays = world.tracer.rays
 
 
@@ -78,13 +79,20 @@ def unpacked(x, world):
     return out
 
 
-def stored(tree, groups):
+def stored(tree, groups, lookups):
     """The tree as its file holds it."""
     at = np.nonzero(tree.known)
     ji = np.stack(at, axis=1).astype(np.int32)
     value = tree.value[at].reshape(-1, groups, 3)
     return trees.Tree(
-        tree.lattice.roots, tree.level, ji, value, tree.hidden[at], tree.noise[at], tree.leaves(), error_of(tree)
+        tree.lattice.roots,
+        tree.level,
+        ji,
+        value,
+        tree.hidden[at],
+        tree.noise[at],
+        tree.leaves(),
+        error_of(tree, lookups),
     )
 
 

@@ -92,7 +92,7 @@ class Quadtree:
         """
         top = top if self._finest is None else self._finest
         divided = [
-            *self.divided,
+            *(level.copy() for level in self.divided),
             *(np.zeros(self.lattice.cells(self.level), dtype=bool) for _ in range(self.level < top)),
         ]
         for level in range(self.base, len(divided)):
@@ -215,14 +215,28 @@ class Quadtree:
             self._wanted[0] |= self._wanted[-1]
         self._wanted &= self.lattice.is_own(self.level) & ~self.known
 
+    def is_leaf(self, level):
+        """Cells of a level that are leaves: (rows, columns) bool."""
+        own = self._exists(level)
+        return own & ~self.divided[level] if level < len(self.divided) else own
+
+    def shares(self):
+        """Area of the map each sample answers for, a quarter of every leaf it is a corner of: (h, w), sum 1 a root
+        cell.
+        """
+        out = np.zeros(self.known.shape)
+        for level in range(self.level + 1):
+            own = self.is_leaf(level)
+            corners = out[:: 2 ** (self.level - level), :: 2 ** (self.level - level)]
+            for part in (np.s_[:-1, :-1], np.s_[:-1, 1:], np.s_[1:, :-1], np.s_[1:, 1:]):
+                corners[part] += own * 4.0 ** -(level + 1)
+        return out
+
     def leaves(self):
         """Leaves as rows (level, j, i), coarse to fine: (m, 3) int32."""
         rows = []
         for level in range(self.level + 1):
-            own = self._exists(level)
-            if level < len(self.divided):
-                own = own & ~self.divided[level]
-            j, i = np.nonzero(own)
+            j, i = np.nonzero(self.is_leaf(level))
             rows.append(np.stack([np.full(j.size, level), j, i], axis=1))
         return np.concatenate(rows).astype(np.int32)
 

@@ -4,14 +4,14 @@ from functools import partial
 
 import numpy as np
 
-from lib.elements.balance import parents
+from lib.elements.balance import children
 from lib.elements.quadtree import SMALLEST_CELL, Quadtree
 from lib.maps.resample import resample
 from lib.radiosity.gather import LookupTable, indirect_light, radiosity_map
 from lib.radiosity.sampling import direct_at, points_at
 
 LARGE_CELL = 1 / 8  # of the scene's largest side
-LEAST_RAYS = 16
+LEAST_RAYS = 32  # or half of what a large cell gets
 USUAL_CONTRAST = 0.6
 AVERAGED = 0.8  # between samples, interpolation averages their noise
 SMOOTH = 0.25  # dividing a cell once more leaves a quarter of the departure of a smooth field
@@ -124,7 +124,7 @@ def rays_for(cell, contrast, K):
     number of rays when rays ~ (area contrast^2)^(1/2.6).  Rounded to sizes that share a batch.
     """
     need = K * np.minimum(1.0, cell / LARGE_CELL) ** (2 / 2.6) * (contrast / USUAL_CONTRAST) ** (2 / 2.6)
-    need = np.clip(need, np.maximum(LEAST_RAYS, K / 8), 4 * K)
+    need = np.clip(need, np.maximum(np.minimum(LEAST_RAYS, K / 2), K / 8), 4 * K)
     return (16 * np.round(2 ** (np.round(2 * np.log2(need)) / 2) / 16)).astype(np.int64)
 
 
@@ -183,21 +183,18 @@ def lookup_table(world, direct, solution, follows_near=True):
     return LookupTable(maps, world.mesh, world.n, world.channels)
 
 
-def error_of(tree):
+def error_of(tree, lookups=0.0):
     """Estimated RMS error of a tree's map [W/m^2]: sampling noise, and what the leaves still depart from their
-    prediction.
+    prediction, by the departure seen when their parents were divided; both by the area they stand for.
+
+    lookups : error of what the rays read [W/m^2], which no sample shows
     """
-    seen = tree.known & ~tree.hidden
-    noise = AVERAGED * float(np.sqrt((tree.noise[seen].astype(np.float64) ** 2).mean())) if seen.any() else 0.0
-    departure, cells = 0.0, 0
-    for level in range(max(tree.base - 1, 0), tree.level):
-        last = (
-            tree.divided[level]
-            if level + 1 >= len(tree.divided)
-            else tree.divided[level] & ~parents(tree.divided[level + 1])
-        )
-        size = 4.0 ** (tree.level - level)
-        departure += float((tree.residual(level)[last].astype(np.float64) ** 2).sum()) * size
-        cells += last.sum() * size
-    interpolation = SMOOTH * np.sqrt(departure / cells) if cells else 0.0
-    return float(np.hypot(noise, interpolation))
+    share = tree.shares() * ~tree.hidden
+    noise = AVERAGED * np.sqrt((share * tree.noise.astype(np.float64) ** 2).sum() / max(share.sum(), 1e-300))
+    departure, area = 0.0, 0.0
+    for level in range(max(tree.base, 1), tree.level + 1):
+        leaf, size = tree.is_leaf(level), 4.0**-level
+        departure += float((children(tree.residual(level - 1))[leaf].astype(np.float64) ** 2).sum()) * size
+        area += leaf.sum() * size
+    interpolation = SMOOTH * np.sqrt(departure / area) if area else 0.0
+    return float(np.sqrt(noise**2 + interpolation**2 + lookups**2))

@@ -223,3 +223,33 @@ def test_leaves_tile_the_surface(roots):
     drawing(tree)
     assert sum(4.0 ** -float(level) for level, _, _ in tree.leaves()) == roots[0] * roots[1]
     assert not any("." in row for row in drawing(tree))
+
+
+def test_shares_of_the_samples_are_those_of_their_leaves():
+    tree = grown(step, tau=0.1, top=4)
+    shares = tree.shares()
+    assert shares.sum() == pytest.approx(1) and (shares[~tree.known] == 0).all()
+    assert shares[0, 0] == 4.0 ** -(int(drawing(tree)[0][0]) + 1)
+
+
+def test_cells_that_exceed_later_are_measured_too():
+    """Samples measured again may exceed at a level that exists already, the deepest one among them: nothing stays
+    divided without samples."""
+    tree = grown(lambda u, v: 0 * u, tau=0.1, top=3)
+    while tree.level < 3:
+        tree.divided.append(np.zeros(tree.lattice.cells(tree.level), dtype=bool))
+        tree.divided[-1][0, 0] = True
+        tree._deepen()
+        tree._want([np.zeros_like(d) for d in tree.divided[:-1]] + [tree.divided[-1]])
+        tree.put(tree.wanted(), 0.0, False, 0.0, np.inf)
+    at = np.array([4]), np.array([4])  # the middle of the map, known from the base level on
+    tree.put(at, 5.0, False, 0.0, np.inf)
+    for _ in range(8):
+        if not tree.split(0.1, 3):
+            break
+        tree.put(tree.wanted(), 0.0, False, 0.0, np.inf)
+    for level, cells in enumerate(tree.divided):
+        known = tree.known[:: 2 ** (3 - level - 1), :: 2 ** (3 - level - 1)]
+        for dj in range(3):
+            for di in range(3):
+                assert known[dj::2, di::2][: cells.shape[0], : cells.shape[1]][cells].all()
