@@ -158,3 +158,15 @@ def points_on_pieces(name):
                 uv[inside] = (uv[inside] - (u0, v0)) / (u1 - u0, v1 - v0)
                 mine = np.setdiff1d(mine, inside)
     return names, np.clip(uv, 0, 1), truth["E"].astype(float), truth["se"].astype(float)
+
+
+def shares_of_area(name):
+    """Share of the scene's area that each reference point stands for: that of its surface, over its points.  (k,)."""
+    folder = HERE / "reference" / name
+    data, mesh = json.loads((folder / "scene.json").read_text()), np.load(folder / "mesh.npz")
+    a, b, c = np.moveaxis(mesh["V"][mesh["F"]].astype(float), 1, 0)
+    face = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    area = np.array([face[s["face_begin"] : s["face_end"]].sum() for s in data["surfaces"]])
+    of = np.load(folder / "points.npz")["surface"]
+    share = (area / np.maximum(np.bincount(of, minlength=len(area)), 1))[of]
+    return share / share.sum()

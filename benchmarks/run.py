@@ -56,10 +56,13 @@ def ours(scene, tolerance, seed, args):
     reference.write_scene(scene, folder, {"tolerance": tolerance, "seed": seed})
     results, figures = bake.bake(folder, args.work / "bake", args.cores)
     names, uv, E, se = reference.points_on_pieces(scene)
+    H = bake.irradiance(results, names, uv)
     return {
         "setting": f"tolerance {tolerance:g}",
         "tolerance": tolerance,
-        **score.errors(bake.irradiance(results, names, uv), E, se),
+        **score.errors(H, E, se),
+        "by_area": score.rmse_by_area(H, E, se, reference.shares_of_area(scene)),
+        "estimate": bake.artefact.read_json(results / "report.json")["totals"]["error"],
         **figures,
     }
 

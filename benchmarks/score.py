@@ -22,6 +22,14 @@ def errors(H, E, se):
     }
 
 
+def rmse_by_area(H, E, se, share):
+    """The RMSE with points weighted by the area they stand for, share (k,): what a bake can estimate of itself."""
+    seen = np.isfinite(H).all(axis=1)
+    share = share[seen] / share[seen].sum()
+    square = (((H - E)[seen] ** 2 - se[seen] ** 2).mean(axis=1) * share).sum()
+    return float(np.sqrt(max(square, 0)) / (E[seen].mean(axis=1) * share).sum())
+
+
 def bilinear(texels, s, t):
     """Texels (h, w, C) at texel coordinates s, t (k,), texel (j, i) standing at s = i, t = j; clamped to the border."""
     h, w = texels.shape[:2]

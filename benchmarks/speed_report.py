@@ -16,7 +16,21 @@ LEVELS = [
     ("standard", 0.01, 0.03, {"cornell": 5, "room": 8}),
     ("final", 0.005, 0.015, {"cornell": 15, "room": 30}),
 ]
-FIGURES = ("cpu", "apart", "wall", "scheduling", "startup", "peak_mb", "rays", "texels", "rmse", "p95", "bias")
+FIGURES = (
+    "cpu",
+    "apart",
+    "wall",
+    "scheduling",
+    "startup",
+    "peak_mb",
+    "rays",
+    "texels",
+    "rmse",
+    "p95",
+    "bias",
+    "by_area",
+    "estimate",
+)
 
 
 def medians(rows):
@@ -72,15 +86,17 @@ def markdown(machine, rows, scenes):
         " `package` and `report` apart. Of it, scheduling: Snakemake and"
         " shells; start: interpreters and imports of the jobs.",
         "",
-        "| scene | setting | RMSE, % | 95 %, % | bias, % | CPU s | scheduling | start | apart | wall s"
+        "| scene | setting | RMSE, % | 95 %, % | bias, % | RMSE by area, % | as estimated, % | CPU s | scheduling | start"
+        " | apart | wall s"
         " | rays, M | texels, k | memory, MB |",
-        "|---|---|---|---|---|---|---|---|---|---|---|---|---|",
+        "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
     for r in (r for r in rows if r["who"] == "ours"):
         cells = [
             r["scene"],
             r["setting"],
             *_errors(r),
+            *(f"{100 * r[f]:.2f}" if f in r else "" for f in ("by_area", "estimate")),
             f"{r['cpu']:.1f}",
             f"{r['scheduling']:.1f}",
             f"{r['startup']:.1f}",

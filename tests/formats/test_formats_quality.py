@@ -13,7 +13,7 @@ def bake_settings(folder, bake="", overrides=None):
     return scene_folder.read(folder, overrides).settings["bake"]
 
 
-@pytest.mark.parametrize("quality, tolerance", [("preview", 0.015), ("standard", 0.01), ("final", 0.003)])
+@pytest.mark.parametrize("quality, tolerance", [("preview", 0.014), ("standard", 0.01), ("final", 0.003)])
 def test_a_name_for_a_tolerance(tmp_path, quality, tolerance):
     found = bake_settings(tmp_path, f"bake: {{quality: {quality}}}")
     assert found["tolerance"] == tolerance and "quality" not in found
@@ -26,7 +26,7 @@ def test_a_tolerance_beside_it_wins(tmp_path):
 
 def test_the_stronger_source_wins(tmp_path):
     """What is typed lies over the scene's, whichever of the two names either uses."""
-    assert bake_settings(tmp_path, "bake: {tolerance: 0.02}", {"bake.quality": "preview"})["tolerance"] == 0.015
+    assert bake_settings(tmp_path, "bake: {tolerance: 0.02}", {"bake.quality": "preview"})["tolerance"] == 0.014
     assert bake_settings(tmp_path, "bake: {quality: preview}", {"bake": {"tolerance": "0.05"}})["tolerance"] == 0.05
     assert bake_settings(tmp_path, "bake: {seed: 2}")["tolerance"] == 0.01
 
