@@ -17,6 +17,7 @@ from lib.visibility.hidden import are_buried
 from lib.visibility.qmc import shift, stream
 
 FEW_RAYS = (4, 4)  # to a lamp from one of an element's 16 points
+MOST_PAIRS = 2**20  # of points and lamp facets on a surface; beyond, only what can not be interpolated is asked
 ROUGH = 0.2  # contrast of a cell's corners from which its elements get shadow rays of their own
 
 
@@ -132,9 +133,12 @@ def surface_elements(world, s, seed, grids, R, base):
     value, hidden, noise, level = base
     cover = world.cover(s, level)
     light = _bilinear(*(finer(value, hidden) if cover is None else (value, hidden)), u, v)
-    cells = is_rough(value, hidden, noise) | _walled_cells(is_walled, hidden.shape)
-    cells |= cover[1] if cover is not None else False
-    own = cells[_cells_of(v, hidden.shape[0])][:, _cells_of(u, hidden.shape[1])] & on.is_part
+    cells = _walled_cells(is_walled, hidden.shape) | (cover[1] if cover is not None else False)
+    rough = cells | is_rough(value, hidden, noise)
+    at = np.ix_(_cells_of(v, hidden.shape[0]), _cells_of(u, hidden.shape[1]))
+    if (rough[at] & on.is_part).sum() * len(world.emitters.facets.area) <= MOST_PAIRS:
+        cells = rough
+    own = cells[at] & on.is_part
     if own.any():  # between samples in light and shadow, of two rooms, or of two charts, nothing can be interpolated
         key = stream(f"{seed} elements", world.scene.names[s])
         j, i = np.nonzero(own)
