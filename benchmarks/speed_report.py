@@ -86,8 +86,8 @@ def markdown(machine, rows, scenes):
         " `package` and `report` apart. Of it, scheduling: Snakemake and"
         " shells; start: interpreters and imports of the jobs.",
         "",
-        "| scene | setting | RMSE, % | 95 %, % | bias, % | RMSE by area, % | as estimated, % | CPU s | scheduling | start"
-        " | apart | wall s"
+        "| scene | setting | RMSE, % | 95 %, % | bias, % | RMSE by area, % | as estimated, % | CPU s"
+        " | scheduling | start | apart | wall s"
         " | rays, M | texels, k | memory, MB |",
         "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|---|",
     ]
