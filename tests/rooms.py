@@ -9,6 +9,7 @@ from lib.formats import scene as scene_file
 from lib.formats.rule_settings import rule_settings
 from lib.maps import emission
 from lib.radiosity.world import World
+from lib.surfaces.mesh import Mesh
 from stages import balance_resample, refine, sample, shoot, tessellate
 from tests.shapes import box
 
@@ -26,6 +27,8 @@ BAKE = {
     "shadow_rays": [8, 16],
     "texture_level": 6,
 }
+
+LEVEL = 5  # of the atlas: charts of 8 cells, 2 cells and more between them
 
 
 def scene_of(surfaces):
@@ -61,6 +64,29 @@ def shining(surface, picture, E=1.0, repeat=(1, 1), **facts):
 def cube(side=1.0, **facts):
     """The six walls of a cube, facing inwards, as scene_of takes them; box() goes down, up, then the other walls."""
     return {f"wall {k}": (face, {"flip": True, **facts}) for k, face in enumerate(box(side))}
+
+
+def cube_mesh(side=1.0):
+    """The six walls of a cube, lit inside, as one mesh of six charts."""
+    V, F, N, uv, chart = [], [], [], [], []
+    for k, wall in enumerate(box(side)):
+        P = wall.P  # lit side: against S_u x S_v
+        corner = np.array([P[0, 0], P[0, 1], P[1, 1], P[1, 0]])
+        n = np.cross(corner[1] - corner[0], corner[3] - corner[0])
+        place = corner_of(k) + np.array([[0, 0], [0, 1], [1, 1], [1, 0]]) / 4
+        for three in ([0, 1, 2], [0, 2, 3]):
+            F.append([len(V) + t for t in range(3)])
+            V += corner[three].tolist()
+            N.append([n / np.linalg.norm(n)] * 3)
+            uv.append(place[three])
+            chart.append(k)
+    F = np.array(F, dtype=np.int32)
+    return Mesh(np.array(V), F, np.array(N), None, np.array(uv), np.array(chart, dtype=np.int32), LEVEL)
+
+
+def corner_of(k):
+    """Where the chart of wall k begins in the atlas; it is a quarter of it wide."""
+    return np.array([1 / 16 + (k % 3) * 5 / 16, 1 / 8 + (k // 3) * 7 / 16])
 
 
 def casters_of(scene, sag=BAKE["sag"]):

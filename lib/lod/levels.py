@@ -23,6 +23,7 @@ from lib.surfaces.mesh import Mesh
 DEVIATION = 1e-4  # of the frame: the finest level, where none is named
 SLIDE = 8  # a texture may slide as many tolerances, or tessellate.SLIDE of the surface's size if that is more
 COARSEST, FINEST = 10.0, 1e-9  # tolerances searched, in frames
+MESH_SHARE = 0.03  # of the side of a square of a mesh's area: thinned farther, boxes lose corners and parts vanish
 LEAST_COUNT = 1.02  # times the least count there is, which is as good as that
 ATTEMPTS = 8  # of asking for fewer triangles where more came out than were predicted
 LESSONS = 1  # times a level by count is cut again after measuring finer what came out far off
@@ -71,10 +72,14 @@ class Scene:
             kinds[Mesh] = partial(MeshLevels, found=found)
         self.pieces = tessellate.Pieces(surfaces, known, lattice, kinds)
         self.size = known.extent.max(axis=1)
+        is_mesh = np.array([isinstance(s, Mesh) for s in surfaces], dtype=bool)
+        self.most = np.where(is_mesh, MESH_SHARE * np.sqrt(known.area), np.inf)
 
     def asked_of(self, tolerance):
-        """(tolerance (n,), allowed slide (n,)) of the surfaces at a chord tolerance."""
-        whole = np.full(len(self.surfaces), float(tolerance))
+        """(tolerance (n,), allowed slide (n,)) of the surfaces at a chord tolerance; a mesh keeps its shape even where
+        nobody asks for it.
+        """
+        whole = np.minimum(float(tolerance), self.most)
         return whole, np.maximum(SLIDE * tolerance, tessellate.SLIDE * self.size)
 
     def predicted(self, tolerance, pieces=None):

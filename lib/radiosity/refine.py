@@ -125,7 +125,7 @@ def rays_for(cell, contrast, K):
     """
     need = K * np.minimum(1.0, cell / LARGE_CELL) ** (2 / 2.6) * (contrast / USUAL_CONTRAST) ** (2 / 2.6)
     need = np.clip(need, np.maximum(np.minimum(LEAST_RAYS, K / 2), K / 8), 4 * K)
-    return (16 * np.round(2 ** (np.round(2 * np.log2(need)) / 2) / 16)).astype(np.int64)
+    return np.maximum(16 * np.round(2 ** (np.round(2 * np.log2(need)) / 2) / 16), 16).astype(np.int64)
 
 
 def rays_of_surfaces(K, own_light):

@@ -11,6 +11,7 @@ from lib.surfaces import tessellate
 from lib.surfaces.gaps import gap
 from lib.visibility import closest
 from tests import shapes
+from tests.rooms import cube_mesh
 from tests.shapes import box, rectangle, sphere, triangle
 
 
@@ -131,3 +132,12 @@ def test_coverage_falls_with_the_level_and_ends_near_zero():
     c = screen_coverage([1e-4, 1e-3, 1e-2], 1.0)
     assert c == pytest.approx([(1 / 1.08) ** 2, (1 / 10.8) ** 2, 1e-6])
     assert screen_coverage([0.1], 1.0).tolist() == [0.0]
+
+
+def test_a_mesh_keeps_its_corners_however_few_triangles_are_asked_for():
+    """A cube of twelve triangles, as one mesh of six charts: there is no smaller level of it."""
+    mesh = cube_mesh()
+    known = tessellate.shapes([mesh], np.ones(1, bool))
+    level = Scene([mesh], known).by_count(3)
+    assert level.is_smallest and len(level.mesh.F) == 12
+    assert level.mesh.distance.max() < 1e-6

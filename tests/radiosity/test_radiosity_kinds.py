@@ -5,35 +5,9 @@ import pytest
 
 from lib.maps.fill import one_deep
 from lib.nurbs.surface import bilinear
-from lib.surfaces.mesh import Mesh
 from lib.surfaces.trimmed import TrimmedSurface
-from tests.rooms import baked, cube
-from tests.shapes import box, rectangle
-
-LEVEL = 5  # of the atlas: charts of 8 cells, 2 cells and more between them
-
-
-def cube_mesh(side=1.0):
-    """The six walls of a cube, lit inside, as one mesh of six charts."""
-    V, F, N, uv, chart = [], [], [], [], []
-    for k, wall in enumerate(box(side)):
-        P = wall.P  # lit side: against S_u x S_v
-        corner = np.array([P[0, 0], P[0, 1], P[1, 1], P[1, 0]])
-        n = np.cross(corner[1] - corner[0], corner[3] - corner[0])
-        place = corner_of(k) + np.array([[0, 0], [0, 1], [1, 1], [1, 0]]) / 4
-        for three in ([0, 1, 2], [0, 2, 3]):
-            F.append([len(V) + t for t in range(3)])
-            V += corner[three].tolist()
-            N.append([n / np.linalg.norm(n)] * 3)
-            uv.append(place[three])
-            chart.append(k)
-    F = np.array(F, dtype=np.int32)
-    return Mesh(np.array(V), F, np.array(N), None, np.array(uv), np.array(chart, dtype=np.int32), LEVEL)
-
-
-def corner_of(k):
-    """Where the chart of wall k begins in the atlas; it is a quarter of it wide."""
-    return np.array([1 / 16 + (k % 3) * 5 / 16, 1 / 8 + (k // 3) * 7 / 16])
+from tests.rooms import baked, corner_of, cube, cube_mesh
+from tests.shapes import rectangle
 
 
 def at(H, u, v):

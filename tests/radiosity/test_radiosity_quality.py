@@ -80,3 +80,9 @@ def test_rays_grow_with_the_cell_and_with_the_contrast_around():
         assert (np.diff(rays) >= 0).all() and rays[0] < rays[-1]
         assert (rays % 16 == 0).all() and rays.min() >= 32 and rays.max() <= 4 * 256
     assert abs(rays_for(np.array([0.125]), np.array([0.6]), np.array([256.0]))[0] - 256) <= 16
+
+
+def test_a_sample_never_gets_no_ray():
+    cells, contrast = np.array([1e-4, 1e-3, 0.1]), np.array([0.01, 0.1, 1.0])
+    for K in (16.0, 32.0, 960.0):
+        assert (rays_for(cells, contrast, np.full(3, K)) >= 16).all()

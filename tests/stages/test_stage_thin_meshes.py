@@ -14,7 +14,7 @@ from tests.lod.charted_meshes import sphere, split
 from tests.shapes import rectangle
 from tests.stages.test_stage_tessellate import small_scene
 
-LEVELS = [{"deviation": "1 %"}, 0.3, {"triangles": 400}]
+LEVELS = [{"deviation": "1 %"}, 0.8, {"triangles": 400}]
 NAMES = ["ball/1", "ball/2", "floor", "moon", "moon back"]
 
 
@@ -94,7 +94,7 @@ def test_levels_are_the_same_with_the_file_and_without(files, k, monkeypatch):
     level = lod_mesh.load(files / "with.npz")
     count = np.diff(level.face_start)
     assert count[3] == count[4] and (k == 0) == (level.distance.max() <= 0.01 * 4)
-    assert count.sum() <= [np.inf, 0.3 * len(lod_mesh.load(first_of(files)).F), 400][k]
+    assert count.sum() <= [np.inf, 0.8 * len(lod_mesh.load(first_of(files)).F), 400][k]
 
 
 def first_of(files):
