@@ -15,7 +15,7 @@ from lib.refusal import refusal
 
 DEFAULTS_FILE = Path(__file__).resolve().parents[2] / "config" / "bake.yaml"
 COMMAND_LINE = "command line"
-QUALITIES = {"preview": 0.014, "standard": 0.01, "final": 0.003}  # bake.quality: names for tolerances
+QUALITIES = {"preview": 0.014, "standard": 0.01, "final": 0.0035}  # bake.quality: names for tolerances
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def without_quality(tree):
     """Plain dict of one source's checked settings with bake.quality replaced by the tolerance it stands for.
 
     >>> without_quality({"bake": {"quality": "final"}})
-    {'bake': {'tolerance': 0.003}}
+    {'bake': {'tolerance': 0.0035}}
     """
     tree = _plain(tree)
     quality = (tree.get("bake") or {}).pop("quality", None)

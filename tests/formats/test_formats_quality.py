@@ -13,7 +13,7 @@ def bake_settings(folder, bake="", overrides=None):
     return scene_folder.read(folder, overrides).settings["bake"]
 
 
-@pytest.mark.parametrize("quality, tolerance", [("preview", 0.014), ("standard", 0.01), ("final", 0.003)])
+@pytest.mark.parametrize("quality, tolerance", [("preview", 0.014), ("standard", 0.01), ("final", 0.0035)])
 def test_a_name_for_a_tolerance(tmp_path, quality, tolerance):
     found = bake_settings(tmp_path, f"bake: {{quality: {quality}}}")
     assert found["tolerance"] == tolerance and "quality" not in found
