@@ -9,8 +9,7 @@ as the map's spacing there, for its bilinear value at T (Williams 1983).
 import numpy as np
 
 from lib.maps.pixels import bilinear, box_means
-from lib.surfaces.domain import Domain
-from lib.surfaces.frames import barycentric
+from lib.surfaces.domain import Domain, barycentric
 from lib.surfaces.measure import corners
 from lib.visibility.qmc import r2
 

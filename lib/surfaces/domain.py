@@ -72,21 +72,10 @@ class Domain:
         inner = self._moved_in(on, face[row])
         return on, inner, face[row]
 
-    def _barycentric(self, uv, face):
-        """(n, 3) weights of the corners of the triangles `face` at uv."""
-        a, b, c = (self.uv[face, k] for k in range(3))
-        e, f, p = b - a, c - a, uv - a
-        double = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
-        double = np.where(np.abs(double) > 1e-300, double, 1e-300)
-        second = (p[:, 0] * f[:, 1] - p[:, 1] * f[:, 0]) / double
-        third = (e[:, 0] * p[:, 1] - e[:, 1] * p[:, 0]) / double
-        return np.stack([1 - second - third, second, third], axis=1)
-
     def _moved_in(self, uv, face):
         """Places uv (n, 2) of triangles `face`, moved towards the middle where they lie within INSIDE of the border."""
-        weight = np.clip(self._barycentric(uv, face), 0.0, 1.0)
-        weight /= weight.sum(axis=1, keepdims=True)
         corner = self.uv[face]
+        weight = barycentric(corner, uv)
         side = np.linalg.norm(np.roll(corner, -1, axis=1) - np.roll(corner, 1, axis=1), axis=2)  # opposite to each
         e, f = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
         height = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0])[:, None] / np.maximum(side, 1e-300)
@@ -186,3 +175,14 @@ class Domain:
             for di in (0, 1):
                 straddling |= owner[dj : dj + rows, di : di + columns] != chart
         return needed, straddling & needed
+
+
+def barycentric(corner, uv):
+    """Weights (n, 3) of the corners (n, 3, 2) of triangles at uv (n, 2), at least 0, their sum 1."""
+    e, f, p = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0], uv - corner[:, 0]
+    double = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
+    double = np.where(np.abs(double) > 1e-300, double, 1e-300)
+    second = (p[:, 0] * f[:, 1] - p[:, 1] * f[:, 0]) / double
+    third = (e[:, 0] * p[:, 1] - e[:, 1] * p[:, 0]) / double
+    weight = np.maximum(np.stack([1 - second - third, second, third], axis=1), 0.0)
+    return weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)

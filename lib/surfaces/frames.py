@@ -8,7 +8,7 @@ be: each corner's tangent plane is asked where it passes above the place, and th
 import numpy as np
 
 from lib.nurbs import evaluate
-from lib.surfaces.domain import Domain
+from lib.surfaces.domain import Domain, barycentric
 from lib.surfaces.mesh import Mesh
 from lib.surfaces.trimmed import TrimmedSurface
 
@@ -66,14 +66,3 @@ def density(surface, uv, face=None):
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     e, f = place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]
     return area / np.maximum(np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]), 1e-300)
-
-
-def barycentric(corner, uv):
-    """Weights (n, 3) of the corners (n, 3, 2) of triangles at uv (n, 2), at least 0, their sum 1."""
-    e, f, p = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0], uv - corner[:, 0]
-    double = e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]
-    double = np.where(np.abs(double) > 1e-300, double, 1e-300)
-    second = (p[:, 0] * f[:, 1] - p[:, 1] * f[:, 0]) / double
-    third = (e[:, 0] * p[:, 1] - e[:, 1] * p[:, 0]) / double
-    weight = np.maximum(np.stack([1 - second - third, second, third], axis=1), 0.0)
-    return weight / np.maximum(weight.sum(axis=1, keepdims=True), 1e-300)
