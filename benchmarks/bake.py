@@ -9,6 +9,7 @@ from pathlib import Path
 import measure
 import numpy as np
 import score
+from jobs import ENVIRONMENT, snakemake
 
 ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
@@ -30,18 +31,8 @@ def bake(folder, work, cores=2, settings=None):
     shutil.rmtree(work, ignore_errors=True)
     Path(work).mkdir(parents=True)
     given = [f"{key}={value}" for key, value in (settings or {}).items()]
-    command = [
-        sys.executable,
-        "-m",
-        "snakemake",
-        "--snakefile",
-        ROOT / "Snakefile",
-        "--directory",
-        work,
-        "--cores",
-        cores,
-    ]
-    spent = measure.run([*command, "--quiet", "all", "--config", f"scene={folder}", *given], log=Path(work) / "log.txt")
+    command = [*snakemake(work, cores), "--quiet", "all", "--config", f"scene={folder}", *given]
+    spent = measure.run(command, log=Path(work) / "log.txt")
     results = Path(work) / "results" / cleaned(Path(folder).name)
     stages, seconds, jobs, rays, peak = {}, 0.0, 0, 0, 0.0
     startup = 0.0
@@ -79,7 +70,7 @@ def bake(folder, work, cores=2, settings=None):
 @functools.cache
 def start_up(stage):
     """CPU seconds of a process that imports a stage and does nothing."""
-    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
+    environment = {**os.environ, **ENVIRONMENT}
     return measure.least_of([sys.executable, "-c", f"import stages.{stage}"], cwd=ROOT, env=environment)
 
 

@@ -40,20 +40,14 @@ class Job:
         return measure.run(command, cwd=work, env={**os.environ, **ENVIRONMENT}, log=Path(work) / "job.txt")
 
 
+def snakemake(work, cores=1):
+    """The command that bakes in the working folder `work`; options and the scene follow."""
+    return [sys.executable, "-m", "snakemake", "--snakefile", ROOT / "Snakefile", "--directory", work, "--cores", cores]
+
+
 def jobs_of(folder, work, stages):
     """The jobs of some stages of the bake of `folder` in `work`, in an order that can be run."""
-    snakemake = [
-        sys.executable,
-        "-m",
-        "snakemake",
-        "--snakefile",
-        ROOT / "Snakefile",
-        "--directory",
-        work,
-        "--cores",
-        "1",
-    ]
-    asked = [*snakemake, "--dry-run", "--forceall", "--printshellcmds", "--config", f"scene={folder}"]
+    asked = [*snakemake(work), "--dry-run", "--forceall", "--printshellcmds", "--config", f"scene={folder}"]
     said = subprocess.run([str(a) for a in asked], capture_output=True, text=True, check=True)
     found = []
     for line in (said.stdout + said.stderr).splitlines():
