@@ -64,8 +64,8 @@ def test_every_level_names_the_same_textures(files):
     status, results = run(files)
     assert status == 0
     uris = [[image["uri"] for image in read_json(results / f"scene_LOD{k}.gltf")["images"]] for k in (0, 1)]
-    assert uris[0] == uris[1] == ["textures/001-s.png", "textures/007-s.png"]
-    assert sorted(p.name for p in (results / "textures").iterdir()) == ["001-s.png", "007-s.png"]
+    assert uris[0] == uris[1] == ["textures/001-surface.png", "textures/007-surface.png"]
+    assert sorted(p.name for p in (results / "textures").iterdir()) == ["001-surface.png", "007-surface.png"]
     lods = read_json(results / "lods.json")
     assert [row["file"] for row in lods["levels"]] == ["scene_LOD0.gltf", "scene_LOD1.gltf"]
     assert lods["levels"][0]["triangles"] > lods["levels"][1]["triangles"]
@@ -106,7 +106,7 @@ def test_a_caster_without_map_is_drawn_in_its_own_colour(files):
 
 def test_hidden_texels_are_filled(files):
     _, results = run(files)
-    codes = read_png8(results / "textures" / "001-s.png")
+    codes = read_png8(results / "textures" / "001-surface.png")
     assert codes.min() > 100  # the buried corner takes its neighbours' light, not black
 
 
@@ -150,7 +150,7 @@ def test_gouraud_puts_the_map_into_vertices_on_its_lattice(files):
     maps = reconstruct(files, {7: "gouraud"})
     _, results = run(files, {"exposure": 2.0}, ways={7: "gouraud"})
     assert read_json(results / "lods.json")["in_vertices"] == ["ball", "picture"]
-    assert [p.name for p in (results / "textures").iterdir()] == ["001-s.png"]
+    assert [p.name for p in (results / "textures").iterdir()] == ["001-surface.png"]
     for k in (0, 1):
         [part] = [p for p in exported.load(results / f"scene_LOD{k}.gltf")[0] if p.name == "picture"]
         assert part.texture == -1 and part.ST is None and len(part.V) == 45 and len(part.F) == 64

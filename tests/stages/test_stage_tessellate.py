@@ -7,6 +7,7 @@ from lib.formats import casters, scene
 from lib.formats.artefact import ArtefactError, read_json
 from lib.nurbs.shape import transformed
 from stages import tessellate
+from tests.rooms import scene_of
 from tests.shapes import box, disc, rectangle, sphere
 
 
@@ -16,22 +17,9 @@ def small_scene(scale=1.0, flip=()):
     surfaces = [transformed(sphere(), lift), *box(), rectangle([0, -1, 0], [1, 0, 0], [0, 0, 1])]
     surfaces = [transformed(s, np.diag([scale, scale, scale, 1.0])) for s in surfaces]
     names = ["ball", *(f"box/{k}" for k in range(1, 7)), "picture"]
-    n = len(names)
-    return scene.Scene(
-        names=names,
-        files=[f"{k:03d}-s" for k in range(n)],
-        surfaces=surfaces,
-        front=np.full(n, -1, np.int32),
-        flip=np.isin(names, flip),
-        role=["cast_only", *["full"] * (n - 2), "receive_only"],
-        E=np.zeros((n, 3)),
-        group=np.zeros(n, np.int32),
-        groups=["all"],
-        is_black=np.zeros(n, bool),
-        material=["white"] * n,
-        up="z",
-        warnings=[],
-    )
+    role = {"ball": "cast_only", "picture": "receive_only"}
+    facts = [{"role": role.get(name, "full"), "flip": name in flip} for name in names]
+    return scene_of(dict(zip(names, zip(surfaces, facts, strict=True), strict=True)))
 
 
 def run(tmp_path, x, settings='{"sag": 0.001}', name="casters.npz"):

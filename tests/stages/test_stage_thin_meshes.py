@@ -11,11 +11,11 @@ from lib.lod import thinned
 from lib.surfaces.measure import transformed
 from stages import lod_export, tessellate, thin_meshes
 from tests.lod.charted_meshes import sphere, split
+from tests.rooms import scene_of
 from tests.shapes import rectangle
 from tests.stages.test_stage_tessellate import small_scene
 
 LEVELS = [{"deviation": "1 %"}, 0.8, {"triangles": 400}]
-NAMES = ["ball/1", "ball/2", "floor", "moon", "moon back"]
 
 
 def mixed_scene():
@@ -23,22 +23,15 @@ def mixed_scene():
     away = np.diag([0.3, 0.3, 0.3, 1.0])
     away[:3, 3] = [3.0, 0.0, 0.0]
     moon = transformed(sphere(8), away)
-    surfaces = [*split(sphere(12), [[0, 1, 2], [3, 4, 5]]), rectangle([0, 0, -1], [4, 0, 0], [0, 4, 0]), moon, moon]
-    n = len(NAMES)
-    return scene.Scene(
-        names=NAMES,
-        files=[f"{k:03d}-s" for k in range(n)],
-        surfaces=surfaces,
-        front=np.array([-1, -1, -1, -1, 3], np.int32),
-        flip=np.array([0, 0, 0, 0, 1], bool),
-        role=["full"] * n,
-        E=np.zeros((n, 3)),
-        group=np.zeros(n, np.int32),
-        groups=["all"],
-        is_black=np.zeros(n, bool),
-        material=["white"] * n,
-        up="z",
-        warnings=[],
+    one, other = split(sphere(12), [[0, 1, 2], [3, 4, 5]])
+    return scene_of(
+        {
+            "ball/1": (one, {}),
+            "ball/2": (other, {}),
+            "floor": (rectangle([0, 0, -1], [4, 0, 0], [0, 4, 0]), {}),
+            "moon": (moon, {}),
+            "moon back": (moon, {"front": "moon", "flip": True}),
+        }
     )
 
 
