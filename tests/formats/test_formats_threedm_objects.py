@@ -222,8 +222,6 @@ def test_textures_that_the_extrusions_name(tmp_path):
 
 
 def test_a_subd_is_named(tmp_path):
-    if not hasattr(rhino3dm, "SubD"):
-        pytest.skip("this rhino3dm has no SubD")
     made = model()
     made.Objects.AddSurface(sheet())
     made.Objects.Add(rhino3dm.SubD(), rhino3dm.ObjectAttributes())
