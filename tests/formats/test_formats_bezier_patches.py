@@ -5,28 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lib.formats import geometry_file
 from lib.nurbs.evaluate import frame, point
 from lib.nurbs.shape import collapsed_sides
-from lib.refusal import Refusal
+from tests.formats.reading import read, refused
 
 DATA = Path(__file__).parents[1] / "data"
 FLAT = [(0, 0, 0), (1, 0, 0), (2, 0, 0), (0, 1, 0), (1, 1, 5), (2, 1, 0)]  # 2 rows of 3 points
 
 
-def read(path, **options):
-    return geometry_file.read(path, path.name, "pot", **options)
-
-
 def write(tmp_path, text, name="a.bpt"):
     (tmp_path / name).write_text(text)
     return tmp_path / name
-
-
-def refused(path, **options):
-    with pytest.raises(Refusal) as caught:
-        read(path, **options)
-    return str(caught.value)
 
 
 def bpt(*headers, points=FLAT):
@@ -76,14 +65,14 @@ def test_only_selects_patches_by_number():
         ("x\n", "expected the number of patches (1 whole number), found 'x' (line 1)"),
         ("0\n", "0 patches; allowed: 1 to"),
         ("9999999\n", "patches; allowed: 1 to"),
-        ("2\n1 2\n" + "0 0 0\n" * 6, "surface pot/2: ends before patch 2 of 2"),
+        ("2\n1 2\n" + "0 0 0\n" * 6, "surface part/2: ends before patch 2 of 2"),
         (
             "1\n1 2\n" + "0 0 0\n" * 5,
-            "surface pot/1: header 1 2 is followed by 5 points; expected 6 (degrees 1 2) or 2",
+            "surface part/1: header 1 2 is followed by 5 points; expected 6 (degrees 1 2) or 2",
         ),
         ("1\n3 3\n0 0 0\n", "header 3 3 is followed by 1 points; expected 16 (degrees 3 3) or 9"),
         ("1\n0 5\n" + "0 0 0\n" * 6, "degrees 1 to 20"),
-        ("1\n1 2\n" + "0 0 0\n" * 5 + "0 nan 0\n", "surface pot/1: points: expected a point (3 finite numbers"),
+        ("1\n1 2\n" + "0 0 0\n" * 5 + "0 nan 0\n", "surface part/1: points: expected a point (3 finite numbers"),
         (
             "1\n1 2\n" + "0 0 0\n" * 5 + "0 1e101 0\n",
             "expected a point (3 finite numbers within 1e100), found '0 1e101 0' (line 8)",
@@ -105,7 +94,7 @@ VERTICES = "".join(f"{i % 4},{i // 4},0\n" for i in range(16))
     "text, said",
     [
         (TEASET + VERTICES[:-6], "16 vertices are announced, 15 follow (line 3)"),
-        (TEASET.replace("16\n16", "17\n16") + VERTICES, "surface pot/1: an index is outside 1 to 16 (line 2)"),
+        (TEASET.replace("16\n16", "17\n16") + VERTICES, "surface part/1: an index is outside 1 to 16 (line 2)"),
         (TEASET.replace("1,2,", "0,2,") + VERTICES, "an index is outside 1 to 16"),
         (TEASET.replace("1,2,", "1.5,2,") + VERTICES, "expected the indices (16 whole numbers)"),
         ("5\n1,2,3\n", "ends before its 5 patches"),

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from geomdl import NURBS, BSpline, exchange, multi
 
-from lib.formats import geometry_file
 from lib.nurbs.evaluate import point
-from lib.refusal import Refusal
+from tests.formats.reading import read, refused
 
 RECORD = {
     "type": "spline",
@@ -33,16 +32,6 @@ def write(tmp_path, *records, **outer):
     shape = {"type": "surface", "count": len(records), "data": list(records), **outer}
     (tmp_path / "a.json").write_text(json.dumps({"shape": shape}))
     return tmp_path / "a.json"
-
-
-def read(path, **options):
-    return geometry_file.read(path, path.name, "arch", **options)
-
-
-def refused(path, **options):
-    with pytest.raises(Refusal) as caught:
-        read(path, **options)
-    return str(caught.value)
 
 
 def changed(**fields):
@@ -88,7 +77,7 @@ def test_trimmed_surfaces_are_refused_by_name_or_skipped(tmp_path):
     path = write(tmp_path, changed(trims={"count": 1, "data": []}), RECORD)
     assert (
         refused(path)
-        == "a.json: surface arch/1: trims: the surface is trimmed; `trimmed: skip` leaves trimmed surfaces out"
+        == "a.json: surface part/1: trims: the surface is trimmed; `trimmed: skip` leaves trimmed surfaces out"
     )
     content = read(path, trimmed="skip")
     assert [patch.number for patch in content.patches] == [2] and content.notes == ["skipped: 1 trimmed surface"]
@@ -131,7 +120,7 @@ def weights(*values):
 )
 def test_broken_surfaces_are_refused_by_name_and_field(tmp_path, fields, said):
     message = refused(write(tmp_path, RECORD, changed(**fields)))
-    assert message.startswith("a.json: surface arch/2: ") and said in message
+    assert message.startswith("a.json: surface part/2: ") and said in message
 
 
 def test_interior_knots_may_repeat_up_to_the_degree(tmp_path):

@@ -10,28 +10,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lib.formats import artefact, geometry_file, step, step_result
+from lib.formats import artefact, step, step_result
 from lib.nurbs.shape import area, collapsed_sides, is_closed
 from lib.nurbs.surface import NurbsSurface, bilinear
-from lib.refusal import Refusal
 from lib.surfaces import trim_area
 from lib.surfaces.trimmed import TrimmedSurface
+from tests.formats.reading import read, refused
 
 DATA = Path(__file__).parents[1] / "data"
 CUBE = DATA / "red_cube_blue_cylinder.step"
 RECORDED = CUBE.with_suffix(".npz")
 CHORDS = 4e-5  # a circle's polygon of 512 corners lacks 2.5e-5 of its area
 needs_ocp = pytest.mark.skipif(find_spec("OCP") is None, reason="needs the extra `step`")
-
-
-def read(path, **options):
-    return geometry_file.read(path, path.name, "part", **options)
-
-
-def refused(path, **options):
-    with pytest.raises(Refusal) as caught:
-        read(path, **options)
-    return str(caught.value)
 
 
 def converter(monkeypatch, code, seconds=60):

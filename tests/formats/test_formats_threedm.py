@@ -6,23 +6,12 @@ import numpy as np
 import pytest
 import rhino3dm
 
-from lib.formats import geometry_file
 from lib.nurbs.evaluate import evaluate, frame, point
 from lib.nurbs.shape import collapsed_sides, is_closed
-from lib.refusal import Refusal
+from tests.formats.reading import read, refused
 
 DATA = Path(__file__).parents[1] / "data"
 UV = np.linspace(0.0, 1.0, 13)
-
-
-def read(path, **options):
-    return geometry_file.read(path, path.name, "part", **options)
-
-
-def refused(path, **options):
-    with pytest.raises(Refusal) as caught:
-        read(path, **options)
-    return str(caught.value)
 
 
 def compare(surface, original):

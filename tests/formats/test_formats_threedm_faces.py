@@ -6,26 +6,16 @@ import numpy as np
 import pytest
 import rhino3dm
 
-from lib.formats import geometry_file, threedm_faces
+from lib.formats import threedm_faces
 from lib.nurbs.evaluate import frame, point
 from lib.nurbs.surface import NurbsSurface
-from lib.refusal import Refusal
 from lib.surfaces.measure import area, collapsed_sides
 from lib.surfaces.trim_build import signed_area
 from lib.surfaces.trimmed import TrimmedSurface
+from tests.formats.reading import read, refused
 
 DATA = Path(__file__).parents[1] / "data"
 TOLERANCE = 0.01  # mm within which the edges of these files lie on their surfaces
-
-
-def read(path, **options):
-    return geometry_file.read(path, path.name, "part", **options)
-
-
-def refused(path):
-    with pytest.raises(Refusal) as caught:
-        read(path)
-    return str(caught.value)
 
 
 def loops(surface):

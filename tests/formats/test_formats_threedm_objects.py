@@ -6,16 +6,12 @@ import numpy as np
 import pytest
 import rhino3dm
 
-from lib.formats import geometry_file
 from lib.nurbs.evaluate import frame
 from lib.surfaces.mesh import Mesh
+from tests.formats.reading import read
 
 DATA = Path(__file__).parents[1] / "data"
 MIDDLE = np.array([0.5])
-
-
-def read(path, **options):
-    return geometry_file.read(path, path.name, "part", **options)
 
 
 def model(unit=rhino3dm.UnitSystem.Meters):
