@@ -154,6 +154,8 @@ class _Patches:
             worst, number = max(far)
             notes.append(f"edges lie off their surface in faces: {len(far)}, most in {number}: {worst:.1e} of its size")
         used = dict.fromkeys(patch.material for patch in patches if patch.material)
+        glass = [name for name in used if name in {self.colours[k] for k in self.faces.see_through}]
+        notes += [f"see-through colours are opaque: {listed(glass)}"] if glass else []
         colours = dict(zip(reversed(self.colours), reversed(self.faces.colours.tolist()), strict=True))
         materials = {name: {"reflectance": colours[name]} for name in used}
         return GeometryFile(patches, len(where), METRES, notes, left_out, materials)

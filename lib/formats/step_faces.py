@@ -14,7 +14,7 @@ import numpy as np
 from OCP.BRep import BRep_Tool
 from OCP.BRepAdaptor import BRepAdaptor_Curve, BRepAdaptor_Curve2d, BRepAdaptor_Surface
 from OCP.BRepTools import BRepTools, BRepTools_WireExplorer
-from OCP.collections import Array1_double, Sequence_TDF_Label
+from OCP.collections import Array1_double, Sequence_TDF_Attribute, Sequence_TDF_Label
 from OCP.collections import IndexedMap_TopoDS_Shape_TopTools_ShapeMapHasher as ShapeMap
 from OCP.Geom import Geom_RectangularTrimmedSurface
 from OCP.GeomAbs import GeomAbs_C2
@@ -22,7 +22,7 @@ from OCP.GeomConvert import GeomConvert
 from OCP.IFSelect import IFSelect_RetDone
 from OCP.IGESCAFControl import IGESCAFControl_Reader
 from OCP.Interface import Interface_Static
-from OCP.Quantity import Quantity_Color
+from OCP.Quantity import Quantity_ColorRGBA
 from OCP.STEPCAFControl import STEPCAFControl_Reader
 from OCP.TCollection import TCollection_AsciiString, TCollection_ExtendedString
 from OCP.TDataStd import TDataStd_Name
@@ -43,6 +43,7 @@ from OCP.TopoDS import TopoDS
 from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf, XCAFDoc_DocumentTool
 
 from lib.formats import step_edges, step_parameters, step_result
+from lib.formats.mistakes import listed
 from lib.nurbs.shape import size
 from lib.nurbs.surface import from_points
 
@@ -80,6 +81,8 @@ def _document(source):
     reader.SetLayerMode(True)
     if is_iges:
         reader.SetReadVisible(True)
+    else:
+        reader.SetSHUOMode(True)
     if reader.ReadFile(source) != IFSelect_RetDone:
         raise Unreadable("is not a readable file of its kind (wrong kind, cut off or damaged)")
     if not reader.Transfer(document):
@@ -95,7 +98,8 @@ class _Converter:
         self.shapes = XCAFDoc_DocumentTool.ShapeTool_s(document.Main())
         self.colour_tool = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
         self.layers = XCAFDoc_DocumentTool.LayerTool_s(document.Main())
-        self.parts, self.colours, self.instances = {}, {}, []
+        self.parts, self.colours, self.see_through, self.instances = {}, {}, set(), []
+        self.overridden = {}  # names of places where an assembly has a colour for one part of what stands there
         self.n_hidden, self.n_curves = 0, 0
         for label in _labels(self.shapes.GetFreeShapes):
             self._walk(label, np.eye(4), (), -1)
@@ -108,6 +112,8 @@ class _Converter:
             self.n_hidden += 1
             return
         names, colour = (*names, *self._names(label)), self._colour(label)
+        if self._is_overridden(label):
+            self.overridden[names[-1] if names else "a place without a name"] = None
         if self.shapes.IsReference_s(label):
             matrix = matrix @ _matrix(self.shapes.GetLocation_s(label))
             part = TDF_Label()
@@ -137,18 +143,32 @@ class _Converter:
     def _colour(self, label):
         """Index of a label's own colour, -1 if it has none."""
         for kind in (XCAFDoc_ColorSurf, XCAFDoc_ColorGen):
-            found = Quantity_Color()
+            found = Quantity_ColorRGBA()
             if self.colour_tool.IsSet(label, kind) and self.colour_tool.GetColor_s(label, kind, found):
-                rgb = tuple(min(max(float(c), 0.0), 1.0) for c in (found.Red(), found.Green(), found.Blue()))
-                return self.colours.setdefault(rgb, len(self.colours))
+                rgb = found.GetRGB()
+                rgb = tuple(min(max(float(c), 0.0), 1.0) for c in (rgb.Red(), rgb.Green(), rgb.Blue()))
+                index = self.colours.setdefault(rgb, len(self.colours))
+                if found.Alpha() < 1.0:
+                    self.see_through.add(index)
+                return index
         return -1
+
+    def _is_overridden(self, label):
+        """Does what holds a placed part have a colour for one of the parts of that?"""
+        uses = Sequence_TDF_Attribute()
+        self.shapes.GetAllComponentSHUO_s(label, uses)
+        found = (uses.Value(k).Label() for k in range(1, uses.Length() + 1))
+        return any(self.colour_tool.IsSet(use, kind) for use in found for kind in (XCAFDoc_ColorSurf, XCAFDoc_ColorGen))
 
     def result(self):
         """Everything as StepFaces."""
         parts = [self._part(label) for _, label in self.parts.values()]
         counts = {"hidden part": self.n_hidden, "curve": self.n_curves}
         notes = [f"{n} {what}{'s' if n > 1 else ''}" for what, n in counts.items() if n]
-        return step_result.packed(parts, list(self.colours), self.instances, notes)
+        if self.overridden:
+            notes.append(f"colours of single parts in {listed(self.overridden)}")
+        see_through = sorted(self.see_through)
+        return step_result.packed(parts, list(self.colours), see_through, self.instances, notes)
 
     def _part(self, label):
         """Name, faces and edges of one part."""

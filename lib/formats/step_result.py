@@ -10,7 +10,7 @@ import numpy as np
 from lib.formats import artefact
 from lib.nurbs.surface import NurbsSurface
 
-KIND, VERSION = "step_faces", 1
+KIND, VERSION = "step_faces", 2
 MAX_FACES = 1_000_000  # of all shapes
 COUNTERS = ("face_first", "pole_first", "knot_first", "loop_first", "use_first", "uv_first", "edge_first")
 
@@ -29,6 +29,7 @@ class StepFaces:
     is_backward : (m,) bool, the use runs against its edge;  uv : (., 2) points of a use along the edge itself, in the
         surface's [0, 1]^2, from uv_first (m + 1,), as many as the edge has points
     S : (., 3) points of an edge from edge_first (e + 1,);  a pole is an edge of equal points
+    see_through : indices of colours that the file has as such
     shapes : s names;  kinds : f names of kinds of surfaces
     instances : dicts, shape (index), matrix (12 numbers, rows of 3 x 4), labels (list of texts), colour (index, or -1)
     failed : {face: why} of faces without a surface;  notes : list of texts
@@ -56,6 +57,7 @@ class StepFaces:
     uv: np.ndarray
     edge_first: np.ndarray
     S: np.ndarray
+    see_through: list
     shapes: list
     kinds: list
     instances: list
@@ -90,7 +92,7 @@ class Face:
     why: str = ""
 
 
-def packed(shapes, colours, instances, notes):
+def packed(shapes, colours, see_through, instances, notes):
     """StepFaces of shapes, a list of (name, list of Face, list of edges' points (k, 3)); bodies count on per shape."""
     faces = [face for _, those, _ in shapes for face in those]
     made = [face.surface for face in faces]
@@ -123,6 +125,7 @@ def packed(shapes, colours, instances, notes):
         uv=np.concatenate([np.zeros((0, 2)), *(use[2] for use in uses)]),
         edge_first=_first([len(S) for S in edges]),
         S=np.concatenate([np.zeros((0, 3)), *edges]),
+        see_through=see_through,
         shapes=[name for name, *_ in shapes],
         kinds=[face.kind for face in faces],
         instances=instances,
@@ -141,7 +144,7 @@ def _uses(faces):
 
 FLAGS = ("is_solid", "is_trimmed", "is_reversed", "is_backward")
 NUMBERS = ("body", "colour", "degree", "count", "edge")
-WORDS = ("shapes", "kinds", "instances", "failed", "notes")
+WORDS = ("see_through", "shapes", "kinds", "instances", "failed", "notes")
 ARRAYS = [item.name for item in fields(StepFaces) if item.name not in WORDS]
 
 
@@ -168,6 +171,7 @@ def check(x):
         _hold(getattr(x, name).ndim == 1 and np.isfinite(getattr(x, name)).all(), name, "NaN or Inf")
     _hold(((x.colours >= 0) & (x.colours <= 1)).all(), "colours", "outside [0, 1]")
     _hold(((x.colour >= -1) & (x.colour < len(x.colours))).all(), "colour", "no such colour")
+    _hold(all(k in range(len(x.colours)) for k in x.see_through), "see_through", "no such colour")
     _hold(x.is_backward.shape == x.edge.shape == (len(x.uv_first) - 1,), "uv_first", "not one for each use")
     _hold(((x.edge >= 0) & (x.edge < len(x.edge_first) - 1)).all(), "edge", "no such edge")
     _hold((np.diff(x.uv_first) == np.diff(x.edge_first)[x.edge]).all(), "uv", "not one for each point of the edge")

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-import subprocess
 import sys
 from importlib.util import find_spec
 from pathlib import Path
@@ -11,17 +10,14 @@ import numpy as np
 import pytest
 
 from lib.formats import artefact, step, step_result
-from lib.nurbs.shape import area, collapsed_sides, is_closed
 from lib.nurbs.surface import NurbsSurface, bilinear
-from lib.surfaces import trim_area
-from lib.surfaces.trimmed import TrimmedSurface
+from lib.surfaces.measure import area
 from tests.formats.reading import read, refused
 
 DATA = Path(__file__).parents[1] / "data"
 CUBE = DATA / "red_cube_blue_cylinder.step"
 RECORDED = CUBE.with_suffix(".npz")
 CHORDS = 4e-5  # a circle's polygon of 512 corners lacks 2.5e-5 of its area
-needs_ocp = pytest.mark.skipif(find_spec("OCP") is None, reason="needs the extra `step`")
 
 
 def converter(monkeypatch, code, seconds=60):
@@ -34,10 +30,6 @@ def converter(monkeypatch, code, seconds=60):
 @pytest.fixture
 def recorded(monkeypatch):
     converter(monkeypatch, f"shutil.copy({str(RECORDED)!r}, out)")
-
-
-def surface_area(surface):
-    return trim_area.area(surface) if isinstance(surface, TrimmedSurface) else area(surface)
 
 
 # --- a converter that fails
@@ -123,7 +115,7 @@ def test_instances_that_point_nowhere_are_refused(monkeypatch, tmp_path, place):
 def test_cube_and_cylinder_have_their_areas_colours_and_box(recorded):
     content = read(CUBE)
     assert (content.total, content.metres, content.notes, content.trimmed) == (9, 0.001, [], [])
-    areas = [surface_area(patch.surface) for patch in content.patches]
+    areas = [area(patch.surface) for patch in content.patches]
     assert areas == pytest.approx([25 * np.pi, 25 * np.pi, 100 * np.pi] + [100.0] * 6, rel=CHORDS)
     assert [patch.material for patch in content.patches] == ["colour #3b61b4"] * 3 + ["colour #dd5228"] * 6
     # The file's sRGB 0.8667 0.3216 0.1569, in linear light
@@ -208,13 +200,12 @@ def square_faces(gap=0.0):
     ], edges
 
 
-def placed(monkeypatch, tmp_path, faces, edges, places, notes=()):
+def placed(monkeypatch, tmp_path, faces, edges, places, notes=(), see_through=()):
     """A file whose one part stands in several places, each a 3 x 4 matrix and a colour."""
     instances = [{"shape": 0, "matrix": M, "labels": ["sheet"], "colour": c} for M, c in places]
     colours = [(1.0, 0.0, 0.0), (0.0, 0.0, 1.0)]
-    step_result.save(
-        tmp_path / "made.npz", step_result.packed([("sheet", faces, edges)], colours, instances, list(notes))
-    )
+    made = step_result.packed([("sheet", faces, edges)], colours, list(see_through), instances, list(notes))
+    step_result.save(tmp_path / "made.npz", made)
     converter(monkeypatch, f"shutil.copy({str(tmp_path / 'made.npz')!r}, out)")
     shutil.copy(CUBE, tmp_path / "made.step")
     return tmp_path / "made.step"
@@ -233,12 +224,27 @@ def test_parts_stand_in_their_places_with_the_nearest_colour(monkeypatch, tmp_pa
     assert [patch.material for patch in content.patches] == [red, None, red, blue, red, blue]
     assert [patch.flip for patch in content.patches] == [False, True, False, True, True, False]
     assert [patch.solid for patch in content.patches] == [None] * 6
-    assert [surface_area(patch.surface) for patch in content.patches] == pytest.approx([0.875, 1.0] * 3)
+    assert [area(patch.surface) for patch in content.patches] == pytest.approx([0.875, 1.0] * 3)
     for first, second in zip(content.patches[::2], content.patches[1::2], strict=True):
         assert len({bytes(S) for S in first.surface.S} & {bytes(S) for S in second.surface.S}) == 2
     turned = np.reshape(TURNED, (3, 4))
     expected = content.patches[0].surface.S @ turned[:, :3].T + turned[:, 3]
     assert content.patches[2].surface.S == pytest.approx(expected, abs=1e-12)
+
+
+def test_colours_that_let_light_through_are_named_if_something_has_them(monkeypatch, tmp_path):
+    path = placed(monkeypatch, tmp_path, *square_faces(), [(HERE, -1)], see_through=[0, 1])
+    assert read(path).notes == ["see-through colours are opaque: colour #ff0000"]
+    assert read(path, only="2").notes == []
+
+
+@pytest.mark.parametrize("see_through", [[2], ["0"], 1])
+def test_see_through_colours_that_are_not_there_are_refused(monkeypatch, tmp_path, see_through):
+    header, arrays = artefact.read(RECORDED, step_result.KIND, step_result.VERSION)
+    header["see_through"] = see_through
+    artefact.write(tmp_path / "spoilt.npz", step_result.KIND, step_result.VERSION, header, arrays)
+    converter(monkeypatch, f"shutil.copy({str(tmp_path / 'spoilt.npz')!r}, out)")
+    assert "file: its conversion gave no result (" in refused(CUBE)
 
 
 def test_a_face_that_could_not_be_converted_is_named_with_its_kind(monkeypatch, tmp_path):
@@ -260,102 +266,3 @@ def test_edges_off_their_surface_are_told_and_refused_if_far(monkeypatch, tmp_pa
 def test_a_file_without_faces_is_refused(monkeypatch, tmp_path):
     path = placed(monkeypatch, tmp_path, [], [], [(HERE, -1)], ["2 curves"])
     assert refused(path) == "made.step: holds no face; it holds 2 curves"
-
-
-# --- with the converter
-
-
-@needs_ocp
-def test_the_recorded_result_is_what_the_converter_makes_today(monkeypatch, tmp_path):
-    out = tmp_path / "faces.npz"
-    subprocess.run([*step.COMMAND, str(CUBE), str(out)], check=True, cwd=step.ROOT)
-    made, kept = step_result.load(out), step_result.load(RECORDED)
-    assert (made.shapes, made.kinds, made.instances) == (kept.shapes, kept.kinds, kept.instances)
-    for name in step_result.ARRAYS:
-        assert getattr(made, name) == pytest.approx(getattr(kept, name), abs=1e-9)
-    assert made.gap.max() < 1e-12
-
-
-@needs_ocp
-def test_a_whole_sphere_is_one_closed_surface_with_two_poles():
-    (patch,) = read(DATA / "revolved_sphere.step").patches
-    assert area(patch.surface) == pytest.approx(4 * np.pi * 25, rel=1e-9)
-    assert is_closed(patch.surface) == (True, False) and collapsed_sides(patch.surface).sum() == 2
-    assert patch.material == "colour #cccccc" and patch.solid
-
-
-@needs_ocp
-def test_a_solid_with_holes_is_closed_bit_for_bit():
-    content = read(DATA / "NIST_MBE_PMI_11.stp")
-    surfaces = [patch.surface for patch in content.patches]
-    assert len(surfaces) == 10 and all(isinstance(surface, TrimmedSurface) for surface in surfaces)
-    assert sorted(len(surface.loop_start) - 1 for surface in surfaces)[-2:] == [2, 2]
-    assert np.ptp(np.concatenate([surface.S for surface in surfaces]), axis=0) == pytest.approx([63, 63, 3], abs=1e-4)
-    _, count = np.unique(np.concatenate([surface.S for surface in surfaces]), axis=0, return_counts=True)
-    assert count.min() >= 2
-
-
-@needs_ocp
-def test_a_pipe_of_loose_iges_faces_comes_in_millimetres():
-    content = read(DATA / "test_pipe.iges")
-    assert content.total == 4 and {patch.solid for patch in content.patches} == {None}
-    total = sum(surface_area(patch.surface) for patch in content.patches)
-    assert total == pytest.approx(2 * np.pi * 1000 * 10000 + 2 * np.pi * 1000**2, rel=CHORDS)
-
-
-@needs_ocp
-@pytest.mark.parametrize("name, source, share", [("cut.step", CUBE, 0.5), ("swapped.igs", CUBE, 1.0)])
-def test_damaged_and_misnamed_files_are_refused(tmp_path, name, source, share):
-    data = source.read_bytes()
-    (tmp_path / name).write_bytes(data[: int(len(data) * share)])
-    assert refused(tmp_path / name).startswith(f"{name}: file: is not a readable file of its kind")
-
-
-def torus(ocp, axis):
-    return ocp.BRepPrimAPI.BRepPrimAPI_MakeTorus(axis, 5.0, 2.0), 4 * np.pi**2 * 5 * 2
-
-
-def cone(ocp, axis):
-    return ocp.BRepPrimAPI.BRepPrimAPI_MakeCone(axis, 3.0, 0.0, 4.0), np.pi * 3 * 5 + np.pi * 9
-
-
-def drilled_sphere(ocp, axis):
-    prim = ocp.BRepPrimAPI
-    ball = prim.BRepPrimAPI_MakeSphere(axis, 3.0).Shape()
-    drill = prim.BRepPrimAPI_MakeCylinder(axis.Translated(ocp.gp.gp_Vec(axis.Direction()) * -9), 1.0, 20.0).Shape()
-    return ocp.BRepAlgoAPI.BRepAlgoAPI_Cut(ball, drill), 2 * np.pi * (3 + 1) * 2 * np.sqrt(8)
-
-
-def drilled_cylinder(ocp, axis):
-    """A bar of radius 1, a hole of radius 0.5 across it: the hole's wall is gained, two windows of the side lost."""
-    prim = ocp.BRepPrimAPI
-    across = ocp.gp.gp_Ax2(axis.Location(), axis.XDirection())
-    bar = prim.BRepPrimAPI_MakeCylinder(axis.Translated(ocp.gp.gp_Vec(axis.Direction()) * -4), 1.0, 8.0).Shape()
-    drill = prim.BRepPrimAPI_MakeCylinder(across.Translated(ocp.gp.gp_Vec(across.Direction()) * -4), 0.5, 8.0).Shape()
-    t = np.linspace(0.0, 2 * np.pi, 4001)[:-1]
-    chord = np.sqrt(1.0 - 0.25 * np.cos(t) ** 2)  # half the length of the hole along each of its lines
-    hole = 0.5 * 2 * chord.mean() * 2 * np.pi
-    lost = 2 * (0.5**2 * np.sin(t) ** 2 / chord).mean() * 2 * np.pi
-    return ocp.BRepAlgoAPI.BRepAlgoAPI_Cut(bar, drill), 2 * np.pi + 16 * np.pi + hole - lost
-
-
-@needs_ocp
-@pytest.mark.parametrize("suffix", [".step", ".igs"])
-@pytest.mark.parametrize("make", [torus, cone, drilled_sphere, drilled_cylinder])
-def test_areas_of_solids_with_closed_forms(tmp_path, make, suffix):
-    ocp = pytest.importorskip("OCP")
-    axis = ocp.gp.gp_Ax2(ocp.gp.gp_Pnt(1, 2, 3), ocp.gp.gp_Dir(1, 2, 2))
-    shape, expected = make(ocp, axis)
-    path = str(tmp_path / f"made{suffix}")
-    if suffix == ".step":
-        writer = ocp.STEPControl.STEPControl_Writer()
-        writer.Transfer(shape.Shape(), ocp.STEPControl.STEPControl_AsIs)
-        writer.Write(path)
-    else:
-        writer = ocp.IGESControl.IGESControl_Writer("MM", 1)
-        writer.AddShape(shape.Shape())
-        writer.ComputeModel()
-        writer.Write(path)
-    content = read(Path(path))
-    assert sum(surface_area(patch.surface) for patch in content.patches) == pytest.approx(expected, rel=CHORDS)
-    assert not content.notes
