@@ -20,7 +20,7 @@ MAX_COUNT = 20_000_000
 MAX_FILE = 512 << 20
 
 
-class Broken(ValueError):
+class Broken(Exception):
     """A glTF file that can not be read: what is wrong with it."""
 
 
@@ -204,9 +204,7 @@ def _parsed(text):
 
     try:
         content = json.loads(text.decode("utf-8-sig"), parse_constant=constant)
-    except (UnicodeDecodeError, RecursionError, ValueError) as error:
-        if isinstance(error, Broken):
-            raise
+    except (RecursionError, ValueError):
         raise Broken("is not JSON, or nested too deep") from None
     asset = content.get("asset") if isinstance(content, dict) else None
     if not isinstance(asset, dict) or not str(asset.get("version", "")).startswith("2."):

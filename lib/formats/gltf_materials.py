@@ -103,7 +103,7 @@ class Materials:
             found["two_sided"] = "auto"
         if UNLIT in extensions:
             self._unlit[name] = None
-        if material.get("alphaMode") == "BLEND" or table(extensions, "KHR_materials_transmission"):
+        if material.get("alphaMode") in ("BLEND", "MASK") or table(extensions, "KHR_materials_transmission"):
             self._see_through[name] = None
         self.made[name] = found
 

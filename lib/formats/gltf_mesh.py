@@ -6,6 +6,7 @@ bind pose.  Source: Khronos, glTF 2.0 specification, sections 3.5 and 3.7.
 
 import fnmatch
 from collections import Counter
+from functools import partial
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from lib.formats.gltf_buffers import Broken, Container, dicts, numbers
 from lib.formats.gltf_materials import Materials, table
 from lib.formats.mistakes import listed
 from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch
-from lib.surfaces.mesh import Mesh
+from lib.surfaces.mesh import Flat, Mesh
 from lib.surfaces.mesh_build import Dropped, mesh
 
 PACKED = ("KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression")
@@ -57,8 +58,9 @@ def read(data, report, only=None, folder="."):
 
 
 def _content(container, placed, skipped, report, only):
-    materials, shapes = Materials(container), _Shapes(container)
-    patches, flat, seen = [], [], {}
+    materials = Materials(container)
+    shapes = _Shapes(container, materials)
+    patches, seen = [], {}
     total = len(placed)
     for number, (mesh_index, k, primitive, labels, M) in enumerate(placed, 1):
         material = primitive.get("material")
@@ -67,32 +69,25 @@ def _content(container, placed, skipped, report, only):
         seen.update(dict.fromkeys(labels[:-1]))
         if only is not None and not any(fnmatch.fnmatchcase(label, only) for label in labels):
             continue
-        try:
-            local = shapes.mesh(mesh_index, k, primitive, materials, material)
-            surface, shape = _moved(local, M, f"{mesh_index}.{k}")
-        except ValueError as error:
-            if isinstance(error, Broken):
-                raise
-            where, _, what = str(error).partition(": ")
-            if where == "triangles":
-                flat.append(names.patch(report.name, number, total))
-            else:
-                report.add(what, number, where)
+        made = report.surface(partial(shapes.placed, mesh_index, k, primitive, M), number)
+        if made is None:
             continue
+        if "COLOR_0" in table(primitive, "attributes"):
+            report.coloured.append(report.of(number))
+        surface, shape = made
         patches.append(Patch(number, surface, labels=labels, material=name, shape=shape))
     if not patches and not len(report.mistakes):
-        what = "no triangle has an area" if only is None or flat else f"nothing matches '{only}'"
-        known = "" if only is None or flat else f"; nodes, meshes and materials: {listed(seen)}"
-        report.add(what + known, field=None if only is None or flat else "only")
-    if flat:
-        skipped[f"surface without an area ({listed(flat)})"] += len(flat)
+        if only is None or report.flat:
+            report.add("no triangle has an area")
+        else:
+            report.add(f"nothing matches '{only}'; nodes, meshes and materials: {listed(seen)}", field="only")
     used = {patch.material for patch in patches}
     kept = {name: found for name, found in materials.made.items() if name in used}
     named = [found.get(field, "") for found in kept.values() for field in ("texture", "emission_texture")]
     keys = {written.removeprefix("embedded:") for written in named}
     parts = [f"{n} {what if n == 1 else PLURAL.get(what, what)}" for what, n in sorted(skipped.items())]
     notes = [f"skipped: {', '.join(parts)}"] if parts else []
-    notes += shapes.dropped.sentences() + materials.notes() + container.files.notes()
+    notes += report.notes() + shapes.dropped.sentences() + materials.notes() + container.files.notes()
     return GeometryFile(
         patches, total, 1.0, notes, materials=kept, up="y",
         pictures={key: data for key, data in materials.pictures.items() if key in keys},
@@ -180,15 +175,18 @@ def _matrix(node):
 class _Shapes:
     """Primitives as meshes in their own axes, each built once; `dropped` sums up over those."""
 
-    def __init__(self, container):
-        self.container, self.dropped, self._made = container, Dropped(), {}
+    def __init__(self, container, materials):
+        self.container, self.materials, self.dropped, self._made = container, materials, Dropped(), {}
 
-    def mesh(self, mesh_index, k, primitive, materials, material):
-        """The Mesh of primitive k of a mesh; ValueError where it has no area."""
+    def placed(self, mesh_index, k, primitive, M):
+        """(Mesh, shape) of primitive k of a mesh in the place M, see `_moved`; ValueError as mesh_build.mesh."""
+        return _moved(self._mesh(mesh_index, k, primitive), M, f"{mesh_index}.{k}")
+
+    def _mesh(self, mesh_index, k, primitive):
         key = mesh_index, k
         if key not in self._made:
             try:
-                self._made[key], dropped = self._build(primitive, materials, material)
+                self._made[key], dropped = self._build(primitive)
                 self.dropped += dropped
             except Broken as error:
                 raise Broken(f"meshes[{mesh_index}].primitives[{k}]: {error}") from None
@@ -198,7 +196,8 @@ class _Shapes:
             raise self._made[key]
         return self._made[key]
 
-    def _build(self, primitive, materials, material):
+    def _build(self, primitive):
+        material = primitive.get("material")
         attributes, read = table(primitive, "attributes"), self.container.accessor
         if "POSITION" not in attributes:
             raise Broken("has no POSITION")
@@ -208,7 +207,7 @@ class _Shapes:
             raise Broken(f"an index is {index.max()}; there are {len(V)} positions")
         F = _triangles(index, primitive.get("mode", TRIANGLES))
         N = read(attributes["NORMAL"], 3) if "NORMAL" in attributes else None
-        wanted = materials.coordinates(material)
+        wanted = self.materials.coordinates(material)
         which, change = wanted or (0, np.eye(2, 3))
         T = read(attributes[f"TEXCOORD_{which}"], 2) if f"TEXCOORD_{which}" in attributes else None
         if any(len(a) != len(V) for a in (N, T) if a is not None):
@@ -218,10 +217,10 @@ class _Shapes:
                 raise Broken("a texture coordinate is not finite")
             T = T @ change[:, :2].T + change[:, 2]
             if T.size and (T.min() < -1e-3 or T.max() > 1 + 1e-3):
-                materials.note_outside(material)
+                self.materials.note_outside(material)
             T = np.stack([T[:, 0], 1.0 - T[:, 1]], axis=1)[F]
         elif wanted is not None:
-            materials.note_unplaced(material)
+            self.materials.note_unplaced(material)
             T = np.zeros((len(F), 3, 2))
         return mesh(V, F, None if N is None else N[F], T)
 
@@ -245,7 +244,7 @@ def _moved(local, M, key):
     A = M[:3, :3]
     mirrored = np.linalg.det(A) < 0
     if not np.linalg.matrix_rank(A) == 3:
-        raise ValueError("triangles: flattened by the placement")
+        raise Flat("triangles: flattened by the placement")
     V = local.V @ A.T + M[:3, 3]
     if not (np.abs(V) <= 1e100).all():
         raise ValueError("positions: beyond 1e100")

@@ -54,7 +54,7 @@ def parse(data, folder, pictures):
     except UnicodeDecodeError:
         text = data.decode("latin-1")
     text = re.sub(r"\\[ \t]*\r?\n", " ", text)
-    materials, faults, current, dark = {}, [], None, []
+    materials, faults, current, dark, glass = {}, [], None, [], []
     for number, line in enumerate(text.splitlines(), 1):
         word, _, rest = line.replace("\t", " ").strip().partition(" ")
         key, rest = word.lower(), rest.strip()
@@ -72,11 +72,17 @@ def parse(data, folder, pictures):
                 current[key] = colour
         elif key in ("map_kd", "map_ke"):
             current[key] = _map(rest)
+        elif key in ("d", "map_d"):
+            current["see-through"] = current.get("see-through") or key == "map_d" or _is_see_through(rest)
     made = {}
     for name, found in materials.items():
         made[name] = _material(found, folder, pictures)
         if "map_ke" in found and max(found.get("ke", (1.0,))) > 0 and "emission" not in made[name]:
             dark.append(name)
+        if found.get("see-through"):
+            glass.append(name)
+    if glass:
+        faults.append(f"see-through materials are opaque: {listed(glass)}")
     if dark:
         faults.append(f"emission textures that can not be used; no light comes from {listed(dark)}")
     return made, faults
@@ -130,6 +136,19 @@ def _colour(rest):
         return None
     values = values * 3 if len(values) == 1 else values
     return tuple(values) if len(values) == 3 and all(0 <= x <= 1e30 for x in values) else None
+
+
+def _is_see_through(rest):
+    """Is the dissolve of a `d` line below 1?
+
+    >>> _is_see_through("0.5"), _is_see_through("-halo 1.0"), _is_see_through("1")
+    (True, False, False)
+    """
+    words = rest.split("#")[0].split()
+    try:
+        return bool(words) and float(words[-1]) < 1.0
+    except ValueError:
+        return False
 
 
 def _map(rest):

@@ -1,7 +1,7 @@
 """Triangle meshes of a Wavefront OBJ: one surface for each material.
 
-Read are v, vt, vn, f (absolute and relative indices, any number of corners), usemtl, mtllib, g and o; smoothing groups,
-colours at vertices and lines are passed over, curves and surfaces are noted.  The format states no unit and no axes.
+Read are v, vt, vn, f (absolute and relative indices, any number of corners), usemtl, mtllib, g and o; smoothing groups
+and lines are passed over, colours at vertices, curves and surfaces are noted.  The format states no unit and no axes.
 """
 
 import fnmatch
@@ -34,7 +34,7 @@ def read(data, report, only=None, folder="."):
         report.fatal("is not text (it holds zero bytes)")
     lines = Lines(data.removeprefix(b"\xef\xbb\xbf"))
     try:
-        V, _ = lines.numbers("v", 3, 3)
+        V, colour = np.split(lines.numbers("v", 3, 6)[0], [3], axis=1)
         texture, texture_lines = lines.numbers("vt", 1, 2)
         normal, normal_lines = lines.numbers("vn", 3, 3)
         corners, count, face_lines = lines.corners()
@@ -54,9 +54,9 @@ def read(data, report, only=None, folder="."):
     except ValueError as error:
         number, _, what = str(error).removeprefix("polygon ").partition(": ")
         report.fatal(what, line=int(lines.number[face_lines[int(number)]]))
-    source = _Source(V, normal, texture, at, corner, face, words)
+    source = _Source(V, colour, normal, texture, at, corner, face, words)
     patches, total, dropped = _patches(source, report, only)
-    notes += dropped.sentences() + words.notes()
+    notes += report.notes() + dropped.sentences() + words.notes()
     used = {patch.material for patch in patches}
     absent = [name for name in used if name is not None and name not in materials]
     if absent and materials:
@@ -81,9 +81,13 @@ def _has_texture(patches, materials, material):
 class _Source:
     """Everything of a file that its surfaces are cut from: arrays, their corners and triangles, words per face."""
 
-    def __init__(self, V, normal, texture, at, corner, face, words):
-        self.V, self.normal, self.texture = V, normal, texture
+    def __init__(self, V, colour, normal, texture, at, corner, face, words):
+        self.V, self.colour, self.normal, self.texture = V, colour, normal, texture
         self.at, self.corner, self.face, self.words = at, corner, face, words
+
+    def is_coloured(self, keep):
+        """Do the positions of the triangles `keep` (indices) have colours?"""
+        return bool(self.colour[self.at[0][self.corner[keep]], 1:].any())  # a weight looks like red alone
 
     def mesh(self, keep):
         """(Mesh, Dropped) of the triangles `keep` (indices)."""
@@ -106,7 +110,7 @@ def _patches(source, report, only):
     report.total = total = len(in_use)
     if total > MAX_PATCHES:
         report.fatal(f"{total} materials; allowed: at most {MAX_PATCHES}")
-    patches, dropped, flat, labels_seen = [], Dropped(), [], {}
+    patches, dropped, labels_seen = [], Dropped(), {}
     for number, k in enumerate(in_use.tolist(), 1):
         keep, name = order[start[k] : start[k + 1]], words.materials[k]
         own = (*([name] if name else []), str(number), names.padded(number, total))
@@ -118,22 +122,17 @@ def _patches(source, report, only):
             groups = matching
             if not len(keep):
                 continue
-        try:
-            surface, left_out = source.mesh(keep)
-        except ValueError as error:
-            where, _, what = str(error).partition(": ")
-            if where == "triangles":
-                flat.append(names.patch(report.name, number, total))
-            else:
-                report.add(what, number, where)
+        made = report.surface(lambda keep=keep: source.mesh(keep), number)
+        if made is None:
             continue
+        if source.is_coloured(keep):
+            report.coloured.append(report.of(number))
+        surface, left_out = made
         dropped += left_out
         labels = dict.fromkeys([*own, *(label for i in groups for label in words.groups[i])])
         patches.append(Patch(number, surface, labels=tuple(labels)[:MOST_LABELS], material=name))
-    if flat:
-        words.found[f"surface{'s' * (len(flat) > 1)} without an area ({listed(flat)})"] += len(flat)
     if not patches and not len(report.mistakes):
-        if only is None or flat:
+        if only is None or report.flat:
             report.add("no triangle has an area")
         else:
             report.add(f"nothing matches '{only}'; materials, groups and objects: {listed(labels_seen)}", field="only")

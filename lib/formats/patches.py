@@ -3,9 +3,9 @@
 from dataclasses import dataclass, field
 
 from lib.formats import names
-from lib.formats.mistakes import Mistakes
+from lib.formats.mistakes import Mistakes, listed
 from lib.nurbs.surface import NurbsSurface
-from lib.surfaces.mesh import Mesh
+from lib.surfaces.mesh import Flat, Mesh
 from lib.surfaces.trimmed import TrimmedSurface
 
 MAX_PATCHES = 100_000
@@ -61,15 +61,29 @@ class GeometryFile:
 
 @dataclass
 class Report:
-    """Where a reader notes its mistakes: in `file`, about patch `number` of the entry `name`."""
+    """Where a reader notes its mistakes: in `file`, about patch `number` of the entry `name`.
+
+    flat, coloured : names of meshes without an area, which are left out, and of those with colours at their vertices
+    """
 
     mistakes: Mistakes
     file: str
     name: str
     total: int = 1
+    flat: list = field(default_factory=list)
+    coloured: list = field(default_factory=list)
+
+    def of(self, number):
+        """The name of patch `number`."""
+        return names.patch(self.name, number, self.total)
+
+    def notes(self):
+        """One sentence per kind of thing that is not taken over."""
+        kinds = ((self.flat, "meshes without an area are left out:"), (self.coloured, "vertex colours are not used:"))
+        return [f"{what} {listed(found)}" for found, what in kinds if found]
 
     def add(self, what, number=None, field=None, line=None):
-        surface = None if number is None else names.patch(self.name, number, self.total)
+        surface = None if number is None else self.of(number)
         self.mistakes.add(what, self.file, surface, field, line)
 
     def fatal(self, what, number=None, field=None, line=None):
@@ -78,9 +92,12 @@ class Report:
         self.mistakes.stop()
 
     def surface(self, make, number, line=None):
-        """`make()`, or None with the reason noted where it raises the ValueError of NurbsSurface (`FIELD: what`)."""
+        """`make()`, or None with the reason noted where it raises a ValueError (`FIELD: what`) or Flat."""
         try:
             return make()
+        except Flat:
+            self.flat.append(self.of(number))
+            return None
         except ValueError as error:
             where, _, what = str(error).partition(": ")
             self.add(what or where, number, where if what else None, line)

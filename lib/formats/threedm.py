@@ -19,6 +19,7 @@ from lib.formats.threedm_materials import Materials
 from lib.formats.threedm_objects import shown
 from lib.nurbs.surface import bilinear
 from lib.surfaces.measure import transformed
+from lib.surfaces.mesh import Flat
 from lib.surfaces.mesh_build import Dropped, mesh
 
 METRES = {
@@ -69,12 +70,15 @@ def read(data, report, only=None, trimmed="keep", folder=".", root=None):
     skipped["trimmed face"] += len(left_out)
     if not patches and not len(report.mistakes):
         known = dict.fromkeys(label for part in parts for label in part.item.labels)
-        what = f"no face matches '{only}'" if only else "every face is trimmed, and `trimmed: skip` leaves them out"
-        report.add(
-            f"{what}; layers and objects: {listed(known) or 'none are named'}", field="only" if only else "trimmed"
-        )
+        if report.flat:
+            what, where = "no mesh has an area", None
+        elif only:
+            what, where = f"no face matches '{only}'", "only"
+        else:
+            what, where = "every face is trimmed, and `trimmed: skip` leaves them out", "trimmed"
+        report.add(f"{what}; layers and objects: {listed(known) or 'none are named'}", field=where)
     notes = [f"skipped: {_summary(skipped)}"] if +skipped else []
-    notes += maker.dropped.sentences() + materials.notes()
+    notes += report.notes() + maker.dropped.sentences() + materials.notes()
     used = dict.fromkeys(patch.material for patch in patches if patch.material is not None)
     made = {key: materials.made[key] for key in used}
     embedded = {m["texture"].removeprefix("embedded:") for m in made.values() if "texture" in m}
@@ -109,6 +113,8 @@ def _patches(parts, materials, report, only, trimmed):
             continue
         surface = report.surface(lambda part=part: _placed(part, trimmed == "skip"), number)
         if surface is not None:
+            if isinstance(part.item.geometry, rhino3dm.Mesh) and len(part.item.geometry.VertexColors):
+                report.coloured.append(report.of(number))
             mirrored = part.item.M is not None and np.linalg.det(part.item.M[:3, :3]) < 0
             key = materials.key(part.item.material) if part.material is None else part.material
             patches.append(Patch(number, surface, part.flip ^ bool(mirrored), labels, key, part.solid))
@@ -119,6 +125,8 @@ def _placed(part, plain):
     try:
         surface = part.make(plain)
         return surface if part.item.M is None else transformed(surface, part.item.M)
+    except Flat:
+        raise
     except ValueError as error:
         more = "" if part.is_whole else "; `trimmed: skip` leaves trimmed faces out"
         raise ValueError(f"{error} (on layer {part.item.layer}{more})") from None

@@ -24,3 +24,7 @@ class Mesh:
     uv: np.ndarray | None = None
     chart: np.ndarray | None = None
     level: int | None = None
+
+
+class Flat(ValueError):
+    """None of the triangles that a mesh was to be made of has an area."""

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from lib.surfaces.mesh import Mesh
+from lib.surfaces.mesh import Flat, Mesh
 
 CREASE = 40.0  # degrees; what tessellated round things fold by is less, what is meant as an edge is more
 FLAT = 1e-10  # height over longest edge of a triangle without an area: far above rounding in float64
@@ -56,7 +56,7 @@ def mesh(V, F, N=None, T=None, crease=CREASE):
     (Mesh, Dropped): positions in the order the triangles first use them, equal ones once, unused ones left out; of
     triangles on the same three positions with the same lit side the first; none flatter than FLAT.
 
-    Raises ValueError `FIELD: what` for positions that are not finite, indices outside V, or when nothing is left.
+    Raises ValueError `FIELD: what` for positions that are not finite and indices outside V, Flat when nothing is left.
     """
     V = np.asarray(V, dtype=np.float64) + 0.0  # -0 is 0
     F = np.asarray(F, dtype=np.int64)
@@ -72,7 +72,7 @@ def mesh(V, F, N=None, T=None, crease=CREASE):
     repeated = keep & ~first
     keep &= first
     if not keep.any():
-        raise ValueError("triangles: none has an area")
+        raise Flat("triangles: none has an area")
     F = F[keep]
     V, F = welded(V, F)
     face, _ = normals_areas(V, F)

@@ -226,10 +226,11 @@ def test_texture_transform_is_baked_in(read):
     assert np.allclose(content.patches[0].surface.T[0], np.stack([file[:, 0], 1 - file[:, 1]], axis=1))
 
 
-def test_textures_that_do_not_repeat_and_lights_without_pictures_are_noted(read):
+@pytest.mark.parametrize("mode", ["BLEND", "MASK"])
+def test_textures_that_do_not_repeat_and_lights_without_pictures_are_noted(read, mode):
     extra = {"samplers": [{"wrapS": 33071}], "cameras": [{}], "animations": [{}]}
     wide = {"extensions": {"KHR_texture_transform": {"scale": [2, 2]}}}
-    look = {"emissiveTexture": {"index": 0, "texCoord": 0}, "emissiveFactor": [1, 1, 1], "alphaMode": "BLEND"}
+    look = {"emissiveTexture": {"index": 0, "texCoord": 0}, "emissiveFactor": [1, 1, 1], "alphaMode": mode}
     doc = textured(wide, extra=extra, extensions={"KHR_materials_unlit": {}}, **look)
     doc.json["textures"][0]["sampler"] = 0
     doc.json["nodes"] += [{"camera": 0}, {"extensions": {"KHR_lights_punctual": {"light": 0}}}]
@@ -298,7 +299,15 @@ def test_lines_and_flat_things_are_passed_over(read):
     doc.json["meshes"][0]["primitives"] += [{"attributes": {"POSITION": 0}, "mode": 1}, flat]
     content = read(doc)
     assert len(content.patches) == 1
-    assert content.notes == ["skipped: 1 set of lines or points, 1 surface without an area (part/2)"]
+    assert content.notes == ["skipped: 1 set of lines or points", "meshes without an area are left out: part/2"]
+
+
+def test_vertex_colours_are_told_of_the_surfaces_that_have_them(read):
+    doc = tetra()
+    painted = {"attributes": {"POSITION": 0, "COLOR_0": doc.add(TETRA)}, "indices": 1}
+    doc.json["meshes"][0]["primitives"] += [painted, dict(painted, mode=1)]
+    assert read(doc).notes == ["skipped: 1 set of lines or points", "vertex colours are not used: part/2"]
+    assert read(doc, "1").notes == ["skipped: 1 set of lines or points"]
 
 
 def broken(**change):

@@ -71,8 +71,8 @@ def test_a_relative_index_counts_from_where_it_stands(read):
     ]  # fmt: skip
 
 
-def test_colours_weights_and_unknown_words_are_passed_over(read):
-    text = "v 0 0 0 1 0 0\nv 1 0 0 1\nv 0 1 0\ns 1\nl 1 2\nfrobnicate\ncurv 0 1 1 2\nf 1 2 3\n"
+def test_weights_and_unknown_words_are_passed_over(read):
+    text = "v 0 0 0 1\nv 1 0 0 1\nv 0 1 0\ns 1\nl 1 2\nfrobnicate\ncurv 0 1 1 2\nf 1 2 3\n"
     content = read(text)
     assert len(content.patches[0].surface.F) == 1
     assert content.notes == ["passed over: 1 curve or surface, 1 line with an unknown word"]
@@ -132,6 +132,13 @@ def test_textures_that_are_not_there_are_named_in_one_sentence(read):
         "wall.png (the mesh has no texture coordinates)",
     ):
         assert part in note
+
+
+def test_colours_of_vertices_and_see_through_materials_are_told(read):
+    mtl = b"newmtl a\nd 0.5\nnewmtl b\nd 1.0\nTr 0\nnewmtl c\nmap_d leaf.png\nnewmtl d\nd -halo 0.9\n"
+    text = "mtllib a.mtl\nv 0 0 0 .2 .4 0\nv 1 0 0 .2 .4 0\nv 1 1 0 .2 .4 0\nv 0 0 1\nv 1 0 1 .5\nv 0 1 1\n"
+    content = read(text + "usemtl a\nf 1 2 3\nusemtl b\nf 4 5 6\n", a_DOT_mtl=mtl)
+    assert content.notes == ["a.mtl: see-through materials are opaque: a, c, d", "vertex colours are not used: part/1"]
 
 
 def test_missing_libraries_and_materials_are_noted(read):

@@ -8,7 +8,7 @@ import rhino3dm
 
 from lib.nurbs.evaluate import frame
 from lib.surfaces.mesh import Mesh
-from tests.formats.reading import read
+from tests.formats.reading import read, refused
 
 DATA = Path(__file__).parents[1] / "data"
 MIDDLE = np.array([0.5])
@@ -88,6 +88,21 @@ def test_a_mesh_keeps_its_triangles_and_normals(tmp_path):
     assert patch.solid is False and len(patch.surface.F) == 3
     assert patch.surface.T is None
     assert np.abs(patch.surface.N - [0, 0, 1]).max() == 0
+
+
+def test_meshes_with_colours_and_without_an_area_are_named(tmp_path):
+    made = model()
+    for height in (1.0, 0.0):
+        mesh = rhino3dm.Mesh()
+        for x, y in ((0, 0), (2, 0), (2, height)):
+            mesh.Vertices.Add(x, y, 0)
+            mesh.VertexColors.Add(255, 128, 0)
+        mesh.Faces.AddFace(0, 1, 2)
+        made.Objects.AddMesh(mesh)
+    content = read(written(made, tmp_path / "a.3dm"))
+    assert [patch.number for patch in content.patches] == [1] and content.total == 2
+    assert content.notes == ["meshes without an area are left out: part/2", "vertex colours are not used: part/1"]
+    assert refused(tmp_path / "a.3dm", only="2").startswith("a.3dm: no mesh has an area")
 
 
 def lamp(style, **fields):
