@@ -10,9 +10,8 @@ for the same place.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
+from lib.surfaces.pieces import pieces
 from lib.surfaces.rows import numbered
 
 AT_ONCE = 400_000  # pairs of a point and a triangle in flight
@@ -83,8 +82,7 @@ def _groups(w, root):
         met = root[w.F[:, i]] == root[w.F[:, j]]
         a.append(w.of[met, i])
         b.append(w.of[met, j])
-    a, b, n = np.concatenate(a), np.concatenate(b), len(w.value)
-    return connected_components(coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(n, n)), directed=False)[1]
+    return pieces(len(w.value), np.concatenate(a), np.concatenate(b))
 
 
 def _closest_on_seams(w, slot, is_open, target, value):

@@ -7,11 +7,11 @@ at most NEAR times apart where distances matter.  A level is then most often one
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from lib.lod.collapse import History
 from lib.lod.thinned import Thinned
+from lib.surfaces.closed import places
+from lib.surfaces.pieces import pieces
 
 STEP = 2.0  # times fewer triangles, from one measured level to the next
 NEAR = 1.1  # times more triangles than needed is near enough
@@ -244,9 +244,6 @@ class MeshLevels:
 def touching(meshes):
     """Groups of meshes that share positions bit for bit, directly or by others: a list of (k,) ascending numbers."""
     owner = np.repeat(np.arange(len(meshes)), [len(mesh.V) for mesh in meshes])
-    V = np.concatenate([mesh.V for mesh in meshes]) + 0.0
-    place = len(meshes) + np.unique(np.ascontiguousarray(V).view("V24").ravel(), return_inverse=True)[1]
-    size = int(place.max()) + 1
-    graph = coo_array((np.ones(len(owner), dtype=np.int8), (owner, place)), shape=(size, size))
-    group = connected_components(graph, directed=False)[1][: len(meshes)]
+    place = len(meshes) + places(np.concatenate([mesh.V for mesh in meshes]))
+    group = pieces(int(place.max()) + 1, owner, place)[: len(meshes)]
     return [np.flatnonzero(group == k) for k in np.unique(group)]

@@ -6,7 +6,6 @@ on which side of a seam it lies, and the free parameter at a pole.
 """
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from lib.nurbs.curve import off_chord
 from lib.nurbs.evaluate import evaluate, evaluate_grid
@@ -48,6 +47,8 @@ class Inverter:
         for lines, ends in ((u, self.collapsed[:2]), (v, self.collapsed[2:])):
             for end in np.flatnonzero(ends):  # no step leads out of a pole
                 lines[-end] = (lines[-end] + lines[1 - 3 * end]) / 2
+        from scipy.spatial import cKDTree  # here: it takes 0.4 s to load, and whole surfaces need none
+
         S = evaluate_grid(surface, u, v)[0]
         self._grid = np.stack(np.meshgrid(u, v), axis=2).reshape(-1, 2)
         self._tree = cKDTree(S.reshape(-1, 3))

@@ -13,10 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 import xatlas
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from lib.surfaces.mesh_build import normals_areas
+from lib.surfaces.pieces import pieces
 
 PADDING = 4  # cells of the finest level between charts, and from the border: one cell two levels coarser
 LEAST_LEVEL, MOST_LEVEL = 3, 11
@@ -124,10 +123,7 @@ def _pieces(mesh):
     rows = np.concatenate([mesh.F.reshape(-1, 1).astype(np.float64), mesh.T.reshape(-1, 2)], axis=1)
     index = np.unique(rows, axis=0, return_inverse=True)[1].reshape(-1, 3)
     n, m = int(index.max()) + 1, len(index)
-    ends = (np.repeat(np.arange(m), 3), m + index.ravel())
-    graph = coo_array((np.ones(3 * m, dtype=np.int8), ends), shape=(m + n, m + n))
-    _, piece = connected_components(graph, directed=False)
-    return index, np.unique(piece[:m], return_inverse=True)[1]
+    return index, pieces(m + n, np.repeat(np.arange(m), 3), m + index.ravel())[:m]
 
 
 def _cut(mesh, unit):

@@ -1,8 +1,8 @@
 """Which triangles of a mesh belong to a closed shell."""
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
+
+from lib.surfaces.pieces import pieces
 
 
 def places(S):
@@ -33,9 +33,7 @@ def in_closed_shell(V, F):
     turns = np.bincount(edge, weights=np.sign(b - a), minlength=len(uses))
     is_sound = turns == 0
     # faces and edges are the nodes; an edge joins all faces that use it
-    size = len(F) + len(uses)
-    graph = coo_array((np.ones(len(edge), dtype=np.int8), (face, len(F) + edge)), shape=(size, size))
-    group = connected_components(graph, directed=False)[1]
+    group = pieces(len(F) + len(uses), face, len(F) + edge)
     is_open = np.zeros(group.max() + 1, dtype=bool)
     is_open[group[len(F) :][~is_sound]] = True
     return ~is_open[group[: len(F)]]

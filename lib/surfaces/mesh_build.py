@@ -7,10 +7,9 @@ around the position, weighted by their angle there, as far as one gets across ed
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from lib.surfaces.mesh import Flat, Mesh
+from lib.surfaces.pieces import pieces
 
 CREASE = 40.0  # degrees; what tessellated round things fold by is less, what is meant as an edge is more
 FLAT = 1e-10  # height over longest edge of a triangle without an area: far above rounding in float64
@@ -133,8 +132,8 @@ def smooth_normals(V, F, face, crease=CREASE):
     triangle_a, k_a, triangle_b, k_b = a // 3, a % 3, b // 3, b % 3
     here = np.concatenate([3 * triangle_a + k_a, 3 * triangle_a + (k_a + 1) % 3])
     there = np.concatenate([3 * triangle_b + (k_b + 1) % 3, 3 * triangle_b + k_b])
-    graph = coo_array((np.ones(len(here), dtype=np.int8), (here, there)), shape=(3 * m, 3 * m))
-    n, group = connected_components(graph, directed=False)
+    group = pieces(3 * m, here, there)
+    n = int(group.max(initial=-1)) + 1
     weighted = (corner_angles(V, F)[..., None] * face[:, None, :]).reshape(-1, 3)
     total = np.stack([np.bincount(group, weighted[:, k], n) for k in range(3)], axis=1)
     N = _unit(total)[0][group].reshape(m, 3, 3)

@@ -9,12 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import pythoncdt
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from lib.nurbs.evaluate import evaluate
 from lib.nurbs.facets import Patch
 from lib.surfaces.loops import following, inside_loops
+from lib.surfaces.pieces import pieces
 from lib.surfaces.trim_distance import distances
 from lib.surfaces.trim_flat import without_flat
 from lib.surfaces.trim_flip import flipped
@@ -117,9 +116,7 @@ def _in_loops(points, F, loops):
     edge, number = np.unique(ends, return_inverse=True)
     is_open = ~np.isin(edge, key[uses % 2 == 1])[number]
     face = np.repeat(np.arange(len(F)), 3)[is_open]
-    size = len(F) + len(edge)
-    graph = coo_array((np.ones(len(face), dtype=np.int8), (face, len(F) + number[is_open])), shape=(size, size))
-    region = connected_components(graph, directed=False)[1][: len(F)]
+    region = pieces(len(F) + len(edge), face, len(F) + number[is_open])[: len(F)]
     area = _signed2(*(points[F[:, k]] for k in range(3)))
     order = np.argsort(-area, kind="stable")
     number, first = np.unique(region[order], return_index=True)
