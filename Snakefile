@@ -1,11 +1,13 @@
 # From a scene folder to its bake: snakemake --cores 2 --config scene=FOLDER [SETTING=VALUE ...]
 # Rules read their slice of the settings as params, so that a changed setting re-runs the stages that read it and no others.
 import os
+import shlex
 import sys
 import uuid
 
 sys.path.insert(0, workflow.basedir)
 
+from lib import warm_start
 from lib.door import stopped
 from lib.formats import preflight
 from lib.formats.artefact import ArtefactError
@@ -38,7 +40,7 @@ envvars:  # goes with jobs to other machines
     "BAKE_SCENE",
 
 
-PYTHON = sys.executable
+RUN = shlex.join([sys.executable, "-I", "-S", os.path.join(workflow.basedir, "stages")])  # stages/__main__.py
 OUT = f"results/{scene.name}"
 STAGE = f"{OUT}/stages"
 SLICES = rule_settings(scene.settings, scene.warnings, scene.tolerances, scene.reconstruction)
@@ -69,6 +71,10 @@ def watched(files):
     return [path.removeprefix(here) for path in files if "{" not in path]
 
 
+onstart:
+    warm_start.start()
+
+
 onerror:
     print(*stopped(STAGE, os.environ["BAKE_RUN"]), sep="\n", file=sys.stderr)  # again, below what Snakemake had to say
 
@@ -94,7 +100,7 @@ rule import_scene:
         *code("import_scene"),
         slice=scene.slices["geometry"],
     shell:
-        "{PYTHON:q} -m stages.import_scene --scene-slice {params.slice:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
+        "{RUN} import_scene --scene-slice {params.slice:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
 
 rule tessellate:
@@ -109,7 +115,7 @@ rule tessellate:
         *code("tessellate"),
         settings=SETTINGS["tessellate"],
     shell:
-        "{PYTHON:q} -m stages.tessellate --scene {input.scene:q} --settings {params.settings:q} --out {output:q}"
+        "{RUN} tessellate --scene {input.scene:q} --settings {params.settings:q} --out {output:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
 
@@ -127,7 +133,7 @@ rule sample:
         settings=SETTINGS["sample"],
         chunks=N_CHUNKS,
     shell:
-        "{PYTHON:q} -m stages.sample --scene {input.scene:q} --casters {input.casters:q} --chunk {wildcards.c} --chunks {params.chunks}"
+        "{RUN} sample --scene {input.scene:q} --casters {input.casters:q} --chunk {wildcards.c} --chunks {params.chunks}"
         " --settings {params.settings:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
 
@@ -147,7 +153,7 @@ rule shoot:
         settings=SETTINGS["shoot"],
         materials=scene.slices["materials"],
     shell:
-        "{PYTHON:q} -m stages.shoot --scene {input.scene:q} --casters {input.casters:q} --samples {input.samples:q}"
+        "{RUN} shoot --scene {input.scene:q} --casters {input.casters:q} --samples {input.samples:q}"
         " --materials {params.materials:q} --settings {params.settings:q} --out {output.solution:q} --plot {output.plot:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
@@ -168,7 +174,7 @@ rule refine_direct:
         settings=SETTINGS["refine"],
         chunks=N_CHUNKS,
     shell:
-        "{PYTHON:q} -m stages.refine --half direct --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
+        "{RUN} refine --half direct --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
         " --samples {input.samples:q} --chunk {wildcards.c} --chunks {params.chunks} --settings {params.settings:q}"
         " --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
@@ -189,7 +195,7 @@ rule refine_indirect:
         settings=SETTINGS["refine"],
         chunks=N_CHUNKS,
     shell:
-        "{PYTHON:q} -m stages.refine --half indirect --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
+        "{RUN} refine --half indirect --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
         " --direct {input.direct:q} --chunk {wildcards.c} --chunks {params.chunks} --settings {params.settings:q}"
         " --out {output:q} --log {log.text:q} --cost {log.cost:q}"
 
@@ -209,7 +215,7 @@ rule balance_resample:
         *code("balance_resample"),
         settings=SETTINGS["balance_resample"],
     shell:
-        "{PYTHON:q} -m stages.balance_resample --scene {input.scene:q} --solution {input.solution:q} --direct {input.direct:q}"
+        "{RUN} balance_resample --scene {input.scene:q} --solution {input.solution:q} --direct {input.direct:q}"
         " --indirect {input.indirect:q} --settings {params.settings:q} --out {output:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
@@ -232,7 +238,7 @@ rule apply_base_texture:
         slice=scene.slices["textures"],
         folder=f"{OUT}/maps",
     shell:
-        "{PYTHON:q} -m stages.apply_base_texture --scene {input.scene:q} --maps {input.maps:q} --materials {params.materials:q}"
+        "{RUN} apply_base_texture --scene {input.scene:q} --maps {input.maps:q} --materials {params.materials:q}"
         " --textures {params.slice:q} --settings {params.settings:q} --maps-folder {params.folder:q}"
         " --out {output.textured:q} --log {log.text:q} --cost {log.cost:q}"
 
@@ -251,7 +257,7 @@ rule budget_reduce:
         *code("budget_reduce"),
         settings=SETTINGS["budget_reduce"],
     shell:
-        "{PYTHON:q} -m stages.budget_reduce --maps {input.textured:q} --casters {input.casters:q} --settings {params.settings:q}"
+        "{RUN} budget_reduce --maps {input.textured:q} --casters {input.casters:q} --settings {params.settings:q}"
         " --out {output.textures:q} --table {output.table:q} --log {log.text:q} --cost {log.cost:q}"
 
 
@@ -269,7 +275,7 @@ if scene.has_meshes:
         params:
             *code("thin_meshes"),
         shell:
-            "{PYTHON:q} -m stages.thin_meshes --scene {input.scene:q} --casters {input.casters:q} --out {output:q}"
+            "{RUN} thin_meshes --scene {input.scene:q} --casters {input.casters:q} --out {output:q}"
             " --log {log.text:q} --cost {log.cost:q}"
 
 
@@ -292,7 +298,7 @@ rule lod_export:
         ladder=["--ladder", f"{STAGE}/thin_meshes/ladder.npz"] if scene.has_meshes else [],
         reconstruction=SETTINGS["reconstruction"],
     shell:
-        "{PYTHON:q} -m stages.lod_export --scene {input.scene:q} --casters {input.casters:q} --levels {params.levels:q} --units m"
+        "{RUN} lod_export --scene {input.scene:q} --casters {input.casters:q} --levels {params.levels:q} --units m"
         " --level-index {wildcards.k} {params.ladder:q} {params.more:q} --reconstruction {params.reconstruction:q} --out {output:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
@@ -317,7 +323,7 @@ rule package:
         materials=scene.slices["materials"],
         results=OUT,
     shell:
-        "{PYTHON:q} -m stages.package --scene {input.scene:q} --casters {input.casters:q} --textures {input.textures:q}"
+        "{RUN} package --scene {input.scene:q} --casters {input.casters:q} --textures {input.textures:q}"
         " --budget {input.budget:q} --lods {input.lods:q} --materials {params.materials:q} --settings {params.settings:q} --results {params.results:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 
@@ -344,7 +350,7 @@ rule report:
         settings=SETTINGS["report"],
         results=OUT,
     shell:
-        "{PYTHON:q} -m stages.report --results {params.results:q} --scene {input.scene:q} --casters {input.casters:q}"
+        "{RUN} report --results {params.results:q} --scene {input.scene:q} --casters {input.casters:q}"
         " --solution {input.solution:q} --direct {input.direct:q} --indirect {input.indirect:q} --maps {input.maps:q}"
         " --textures {input.textures:q} --budget {input.budget:q} --lods {input.lods:q} --settings {params.settings:q}"
         " --out-html {output.html:q} --out-json {output.json:q} --log {log.text:q} --cost {log.cost:q}"

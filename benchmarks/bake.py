@@ -24,9 +24,8 @@ APART = ("package", "report")  # counted beside the pipeline: they make the file
 def bake(folder, work, cores=2, settings=None):
     """Bake the scene `folder` from nothing, in the working folder `work`: (its results folder, dict of figures).
 
-    cpu : all processes, less the jobs of APART; apart : those; startup : what the interpreter and the imports of all
-    other jobs take; scheduling : Snakemake and the shells, all that no job accounts for; stages : CPU seconds and
-    rays by stage.
+    cpu : all processes, less the jobs of APART; apart : those; scheduling : Snakemake, shells, interpreters and
+    imports, all that no job accounts for; stages : CPU seconds and rays by stage.
     """
     shutil.rmtree(work, ignore_errors=True)
     Path(work).mkdir(parents=True)
@@ -35,7 +34,6 @@ def bake(folder, work, cores=2, settings=None):
     spent = measure.run(command, log=Path(work) / "log.txt")
     results = Path(work) / "results" / cleaned(Path(folder).name)
     stages, seconds, jobs, rays, peak = {}, 0.0, 0, 0, 0.0
-    startup = 0.0
     for path in sorted((results / "stages").glob("*/cost*.json")):
         cost = artefact.read_json(path)
         half = next((h for h in ("indirect", "direct") if h in path.stem), "")
@@ -48,15 +46,12 @@ def bake(folder, work, cores=2, settings=None):
         rays += cost["rays"]
         jobs += 1
         peak = max(peak, cost["peak_mb"])
-        if name not in APART:
-            startup += start_up(cost["stage"])
     apart = sum(stages[name]["cpu"] for name in APART if name in stages)
     figures = {
         "cpu": spent.cpu - apart,
         "apart": apart,
         "wall": spent.wall,
         "scheduling": spent.cpu - seconds,
-        "startup": startup,
         "peak_mb": spent.peak_mb,
         "largest_job_mb": peak,
         "rays": rays,

@@ -160,9 +160,7 @@ def measured(axis, size, work):
         "elements": lambda: int(sum(len(x) for x in [solution.load(stages / "shoot" / "solution.npz").H_indirect])),
         "surfaces": lambda: size + 8,
     }
-    seconds = {
-        name: row["cpu"] - row["jobs"] * bake.start_up(name.split()[0]) for name, row in figures["stages"].items()
-    }
+    seconds = {name: row["cpu"] for name, row in figures["stages"].items()}
     seconds["snakemake"] = figures["scheduling"]
     return {
         "size": counted.get(axis, lambda: size)(),

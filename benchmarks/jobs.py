@@ -11,6 +11,7 @@ from pathlib import Path
 import measure
 
 ROOT = Path(__file__).resolve().parents[1]
+DOOR = str(ROOT / "stages")  # what the rules run, before the name of the stage
 ENVIRONMENT = {"OPENBLAS_NUM_THREADS": "1", "PYTHONPATH": str(ROOT)}
 
 
@@ -51,9 +52,9 @@ def jobs_of(folder, work, stages):
     said = subprocess.run([str(a) for a in asked], capture_output=True, text=True, check=True)
     found = []
     for line in (said.stdout + said.stderr).splitlines():
-        words = shlex.split(line.split("Shell command:")[-1]) if " -m stages." in line else []
-        if "-m" in words and (stage := words[words.index("-m") + 1].removeprefix("stages.")) in stages:
-            arguments, rest = {}, words[words.index("-m") + 2 :]
+        words = shlex.split(line.split("Shell command:")[-1]) if f"{DOOR} " in line else []
+        if DOOR in words and (stage := words[words.index(DOOR) + 1]) in stages:
+            arguments, rest = {}, words[words.index(DOOR) + 2 :]
             for word in rest:
                 if word.startswith("--"):
                     values = arguments.setdefault(word, [])

@@ -20,6 +20,12 @@ from lib.formats.artefact import ArtefactError, read_json, write_json
 from lib.refusal import Refusal
 
 
+def cpu_seconds():
+    """User and system seconds of this process and its children so far."""
+    usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
+    return sum(u.ru_utime + u.ru_stime for u in usage)
+
+
 @dataclass
 class Cost:
     """What a job spent: rays are counted by the stage, times and memory by the door.
@@ -33,16 +39,16 @@ class Cost:
     notes: dict = field(default_factory=dict)
     stopped: str = ""
     started: float = field(default_factory=time.monotonic)
+    cpu_before: float = field(default_factory=cpu_seconds)
 
     def as_dict(self):
-        """The JSON record: wall and CPU seconds of this process (children included), peak memory in MB, rays."""
-        usage = [resource.getrusage(who) for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)]
-        peak = _own_peak_kb() or usage[0].ru_maxrss
+        """The JSON record: wall and CPU seconds since this was made (children included), peak memory in MB, rays."""
+        peak = _own_peak_kb() or resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         return {
             "stage": self.stage,
             "seconds": round(time.monotonic() - self.started, 4),
-            "cpu_seconds": round(sum(u.ru_utime + u.ru_stime for u in usage), 4),
-            "peak_mb": round(max(peak, usage[1].ru_maxrss) / 1024, 1),
+            "cpu_seconds": round(cpu_seconds() - self.cpu_before, 4),
+            "peak_mb": round(max(peak, resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss) / 1024, 1),
             "rays": int(self.rays),
             "notes": self.notes,
             "run": os.environ.get("BAKE_RUN", ""),

@@ -1,0 +1,169 @@
+"""One process that has numpy and the stages loaded, and a fork of it for each job of a bake.
+
+Starting an interpreter and importing numpy and a stage costs a job 0.15 to 0.25 CPU s, more than what most jobs of a
+small scene do; a fork costs 0.01 s.  `start` is called once by the Snakefile when a run begins; jobs reach the process
+through `stages/__main__.py`, which runs the stage by itself where there is no such process (on other machines, by
+hand).  Modules are loaded when the first job asks for them, before the fork; none of them starts a thread when it is
+loaded, which a fork would lose.
+
+A request is a message of 8 bytes, the length of what follows, and texts with a zero byte between them: working folder,
+number of arguments, stage, arguments, NAME=VALUE of the environment; with it come the file descriptors of standard
+input, output and error.  The answer is the exit status as text.
+"""
+
+import atexit
+import gc
+import importlib
+import os
+import selectors
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import tempfile
+import traceback
+from contextlib import suppress
+from typing import NamedTuple
+
+VARIABLE = "BAKE_WARM"  # of the environment: where jobs find the address
+_HEAD = 8
+
+
+def start():
+    """Start the process and put its address into the environment; it ends with this one.
+
+    Nothing is started where the system has no process descriptors (Linux 5.3 and later has them).
+    """
+    if not hasattr(os, "pidfd_open"):
+        return
+    folder = tempfile.mkdtemp(prefix="bake-")  # open to this user alone
+    address = os.path.join(folder, "jobs")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
+        listener.bind(address)
+        listener.listen(128)
+        command = [sys.executable, "-P", "-m", "lib.warm_start", str(listener.fileno())]
+        process = subprocess.Popen(command, stdin=subprocess.PIPE, pass_fds=[listener.fileno()])
+    os.environ[VARIABLE] = address
+
+    def end():
+        process.stdin.close()
+        process.wait()
+        shutil.rmtree(folder, ignore_errors=True)
+
+    atexit.register(end)
+
+
+class Request(NamedTuple):
+    """A stage to run, with the arguments, working folder and environment of who asked."""
+
+    folder: str
+    stage: str
+    arguments: list
+    environment: dict
+
+
+class Jobs:
+    """Forks children for requests that come on the socket `listener`, and answers with their exit status."""
+
+    def __init__(self, listener):
+        self._listener, self._events = listener, selectors.DefaultSelector()
+        self._children = {}  # {connection: (process id, its descriptor)}
+
+    def serve(self, lifeline):
+        """Until the file `lifeline` is at its end; then the children are ended too."""
+        self._events.register(self._listener, selectors.EVENT_READ)
+        self._events.register(lifeline, selectors.EVENT_READ)
+        while True:
+            for key, _ in self._events.select():
+                if key.fileobj is lifeline:
+                    for pid, _ in self._children.values():
+                        os.kill(pid, signal.SIGTERM)
+                    return
+                if key.fileobj is self._listener:
+                    self._begin(self._listener.accept()[0])
+                elif key.fileobj is key.data:  # who asked was stopped
+                    os.kill(self._children[key.data][0], signal.SIGTERM)
+                    self._events.unregister(key.data)
+                else:
+                    self._end(key.data)
+
+    def _begin(self, connection):
+        try:
+            request, streams = _received(connection)
+            pid = _forked(request, streams, [self._listener, connection, *self._children])
+        except (OSError, ValueError):  # who asked has gone, or there is no room for a process: nothing is answered
+            connection.close()
+            return
+        self._children[connection] = pid, os.pidfd_open(pid)
+        for event in (connection, self._children[connection][1]):
+            self._events.register(event, selectors.EVENT_READ, connection)
+
+    def _end(self, connection):
+        pid, descriptor = self._children.pop(connection)
+        status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+        with suppress(KeyError):
+            self._events.unregister(connection)
+        self._events.unregister(descriptor)
+        os.close(descriptor)
+        with suppress(OSError):
+            connection.sendall(str(status if status >= 0 else 128 - status).encode())  # as a shell has it
+        connection.close()
+
+
+def _received(connection):
+    """(Request, [3 file descriptors])."""
+    data, streams, _, _ = socket.recv_fds(connection, 1 << 16, 3)
+    while len(data) < _HEAD or len(data) < _HEAD + int.from_bytes(data[:_HEAD], sys.byteorder):
+        more = connection.recv(1 << 20)
+        if not more:
+            raise ValueError("a request ended early")
+        data += more
+    folder, n, stage, *rest = (os.fsdecode(word) for word in data[_HEAD:].split(b"\0"))
+    return Request(folder, stage, rest[: int(n)], dict(word.split("=", 1) for word in rest[int(n) :])), streams
+
+
+def _forked(request, streams, sockets):
+    """Process id of a child that runs the request, with these streams and without these sockets."""
+    name = f"stages.{request.stage}"
+    with suppress(Exception):  # the child will say what is wrong with it
+        importlib.import_module(name)
+    gc.collect()
+    gc.freeze()  # what is loaded stays shared: the children's collections leave it alone
+    pid = os.fork()
+    if not pid:
+        _run(name, request, streams, sockets)
+    for stream in streams:
+        os.close(stream)
+    return pid
+
+
+def _run(name, request, streams, sockets):
+    """Become the job; does not return."""
+    status = 1
+    try:
+        for number, stream in enumerate(streams):
+            os.dup2(stream, number)
+            os.close(stream)
+        for one in sockets:
+            one.close()
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        os.chdir(request.folder)
+        os.environ.clear()
+        os.environ.update(request.environment)
+        sys.argv = [name, *request.arguments]
+        status = importlib.import_module(name).main(request.arguments)
+    except SystemExit as end:  # from argparse
+        status = end.code if isinstance(end.code, int) else 1
+    except BaseException:
+        traceback.print_exc()
+    finally:
+        with suppress(Exception):
+            sys.stdout.flush()
+            sys.stderr.flush()
+        os._exit(status)
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the jobs hear it, and Snakemake, which ends this process
+    Jobs(socket.socket(fileno=int(sys.argv[1]))).serve(sys.stdin)
