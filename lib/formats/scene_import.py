@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from lib.formats import geometry_file, names, scene_geometry
+from lib.formats.mistakes import listed
 from lib.formats.scene import Scene
 from lib.nurbs.coincident import coincident
 from lib.nurbs.surface import NurbsSurface
@@ -38,6 +39,7 @@ NO_LIGHT = (
     "no surface emits light, every map will be black. Add to scene.yaml the line `light: studio` for a soft lamp"
     " overhead, or let a material shine: under `materials:` a line like `NAME: {{lumens: 2000}}` (here are: {})"
 )
+OWN_REFUSED = "{}: `uv: own`: no texture coordinates, or they fold, overlap or stretch; charts are made for {}"
 MOST_TOLD = 8  # pairs of surfaces a warning names
 
 
@@ -86,8 +88,8 @@ def read(piece, folder, file, cache=None, pictures_folder=None):
         if row["front"] is not None:
             one = front[row["front"]]
             placed.append(replace(one, name=name, flip=not one.flip, front=one.name))
-    placed = with_charts(placed, piece["geometry"])
-    made = assemble(placed, notes, piece["surfaces"], piece["up"])
+    placed, refused = with_charts(placed, piece["geometry"])
+    made = assemble(placed, [*notes, *refused], piece["surfaces"], piece["up"])
     return replace(made, glow=glow(made, piece["surfaces"], folder, pictures_folder, file))
 
 
@@ -116,18 +118,19 @@ def glow(made, table, folder, pictures_folder, file):
 
 
 def with_charts(placed, entries):
-    """The placed surfaces with charts on their meshes: made once for all copies of one size, and for both sides.
+    """(The placed surfaces with charts on their meshes: made once for all copies of one size, and for both sides; notes
+    on those whose own coordinates do not serve).
 
     A finest cell of a mesh's map is FINEST of the scene's largest side, less on meshes of less than MOST_CELLS of these
     across.
     """
     meshes = [one for one in placed if isinstance(one.surface, Mesh)]
     if not meshes:
-        return placed
+        return placed, []
     from lib.surfaces import charts  # xatlas, for meshes alone
 
     scale = tessellate.frame([one.surface for one in placed])[1]
-    made, out = {}, {}
+    made, out, refused = {}, {}, {}
     for one in meshes:
         size, entry, mesh = float(np.cbrt(abs(np.linalg.det(one.M[:3, :3])))), entries[one.entry], one.part.surface
         shape = (entry["file"], one.part.shape) if one.part.shape else id(one.part)
@@ -135,13 +138,16 @@ def with_charts(placed, entries):
         if key not in made:
             texel = finest_cell(one.area, scale) / size
             own = charts.own_charts(mesh, texel) if key[-1] == "own" else None
-            made[key] = own or charts.charted(mesh, texel)
+            made[key] = own or charts.charted(mesh, texel), key[-1] == "own" and own is None
         if one.front is None:
-            atlas = made[key]
+            atlas, is_refused = made[key]
+            if is_refused:
+                refused.setdefault(entry["file"], []).append(one.name)
             out[one.name] = transformed(replace(mesh, uv=atlas.uv, chart=atlas.chart, level=atlas.level), one.M)
-    return [
+    placed = [
         replace(one, surface=out[one.front or one.name]) if isinstance(one.surface, Mesh) else one for one in placed
     ]
+    return placed, [OWN_REFUSED.format(file, listed(found)) for file, found in refused.items()]
 
 
 def finest_cell(area, scale):

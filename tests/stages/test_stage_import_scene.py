@@ -92,3 +92,16 @@ def test_a_lamp_in_the_plane_of_a_ceiling_is_a_warning_with_both_names(home, cap
     assert run(preflight.load(home)) == 0
     said = "warning: surfaces floor and glow lie in one another, lit on the same side: move one a little"
     assert said in capsys.readouterr().err
+
+
+def test_texture_coordinates_that_do_not_serve_as_a_map_are_told(home, capsys):
+    """Of two sheets one has both triangles on the same place of the picture."""
+    obj = "v 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\n"
+    obj += "usemtl good\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\nusemtl folded\nf 1/1 2/2 3/3\nf 1/1 3/3 4/2\n"
+    (home / "sheets.obj").write_text(obj)
+    entry = "- {name: sheets, file: sheets.obj, uv: own, place: [{}, {translate: [0, 0, 1]}], two_sided: true}\n"
+    (home / "scene.yaml").write_text(TEXT.replace("materials:", entry + "materials:"))
+    assert run(preflight.load(home)) == 0
+    (told,) = [line for line in capsys.readouterr().err.splitlines() if "uv: own" in line]
+    assert told.startswith("warning: sheets.obj: `uv: own`: no texture coordinates, or they fold, ")
+    assert told.endswith("charts are made for sheets.1/2, sheets.2/2")
