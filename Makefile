@@ -90,7 +90,7 @@ setup:  ## only create .venv from requirements.lock and check the system's libra
 	        exit 1
 	    fi
 	    if [ -e .venv ]; then say "Remaking .venv: it is incomplete, or made for another folder or lock file."; fi
-	    say "Setting up .venv with $$("$$python" --version): 105 packages, 240 MB to download the first time."
+	    say "Setting up .venv with $$("$$python" --version): 107 packages, 300 MB to download the first time."
 	    rm -rf .venv
 	    "$$python" -m venv .venv
 	    pip() { .venv/bin/python -m pip --disable-pip-version-check --no-input "$$@"; }

@@ -20,6 +20,8 @@ OWNERS = {  # the one importer of each other library: start-up cost per job, and
     "geomdl": ("lib/nurbs/model.py",),
     "open3d": ("lib/visibility/closest.py",),
     "embreex": ("lib/visibility/tracer.py",),
+    "numba": ("lib/compiled.py",),
+    "llvmlite": ("lib/compiled.py",),
     "OpenImageIO": ("lib/formats/pictures.py",),
     "rhino3dm": ("lib/formats/threedm.py",),
     "pygltflib": ("lib/formats/gltf.py",),

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from lib.elements.grids import POINTS, at_centres
-from lib.elements.lattice import OFFSET
-from lib.visibility.hemisphere import cosine_direction_each, cosine_directions
+from lib.radiosity import gather_kernels as kernels
+from lib.visibility.hemisphere import rays_about
 from lib.visibility.hidden import is_hidden
-from lib.visibility.qmc import fibonacci, path_coordinates
+from lib.visibility.qmc import fibonacci, path_steps
 
 RAYS_AT_ONCE = 16384  # what is gathered stays in the cache
 NEAR = 2.0  # hits nearer than this many element widths are followed on
@@ -87,62 +87,27 @@ class LookupTable:
             rho[s], near[s] = m.rho, NEAR * m.width
             total += h * w
         self._all, self._direct = np.concatenate(blocks), np.concatenate(direct)
-        self._faces = mesh.texel_coordinates(width, height)
         surface = np.append(mesh.face_surface, n_surfaces)
+        faces = mesh.texel_coordinates(width, height)
         width, height = np.append(width, 2), np.append(height, 2)
-        self._offset, self._width = offset[surface].astype(np.int64), width[surface].astype(np.int64)
-        last = np.stack([width[surface] - 2, height[surface] - 2], axis=1).astype(np.float32)
-        self._faces = np.concatenate([self._faces, last], axis=1)
-        self._rho, self._near = rho[surface], near[surface]
+        last = np.stack([width[surface] - 2, height[surface] - 2], axis=1)
+        self._faces = np.concatenate([faces, last.astype(np.float32)], axis=1)
+        self._places = self._faces, offset[surface], width[surface]
+        self._rho, self._near, self.normal = rho[surface], near[surface], mesh.normal
 
-    def all_light(self, hits):
-        """Radiosity seen by each ray, (n, C) float32: 0 for misses and back faces."""
-        return self._look_up(self._all, hits)
+    def see(self, hits, follows):
+        """Radiosity seen by each ray, (n, C) float32, 0 for misses and back faces; and which rays (m,) hit fronts
+        nearer than the elements there are wide: of those nothing is known yet if follows, otherwise there are none.
+        """
+        seen = np.empty((len(hits.face), self._rho.shape[1]), dtype=np.float32)
+        chosen = np.empty(len(hits.face), dtype=np.int64)
+        rays = hits.face, hits.a, hits.b, hits.t, hits.is_back
+        n = kernels.see(*self._places, self._all, self._near, *rays, follows, seen, chosen)
+        return seen, chosen[:n]
 
-    def direct_light(self, hits):
-        """The same of direct light alone."""
-        return self._look_up(self._direct, hits)
-
-    def rho(self, hits):
-        """Reflectance at front hits, (n, C)."""
-        return self._rho[hits.face]
-
-    def is_near(self, hits):
-        """(n,) bool: front hits nearer than the elements there are wide."""
-        return ~hits.is_back & (hits.t < self._near[hits.face]) & (hits.face >= 0)
-
-    def _look_up(self, texels, hits):
-        # np.take and work in place: half the time of plain indexing, and this is where the time goes.
-        face = np.where(hits.is_back | (hits.face < 0), len(self._offset) - 1, hits.face)
-        place = np.take(self._faces, face, axis=0)
-        s = place[:, 0] + hits.a * place[:, 2] + hits.b * place[:, 4]
-        t = place[:, 1] + hits.a * place[:, 3] + hits.b * place[:, 5]
-        i = np.minimum(np.maximum(np.floor(s), 0), place[:, 6])
-        j = np.minimum(np.maximum(np.floor(t), 0), place[:, 7])
-        s -= i
-        t -= j
-        width = np.take(self._width, face)
-        corner = j.astype(np.int64)
-        corner *= width
-        corner += i.astype(np.int64)
-        corner += np.take(self._offset, face)
-        low = self._along(texels, corner, s[:, None])
-        corner += width
-        texel = self._along(texels, corner, s[:, None])
-        texel -= low
-        texel *= t[:, None]
-        texel += low
-        weight = texel[:, -1:]
-        return texel[:, :-1] / np.where(weight > 0, weight, np.float32(1))
-
-    @staticmethod
-    def _along(texels, corner, f):
-        first = np.take(texels, corner, axis=0)
-        second = np.take(texels, corner + 1, axis=0)
-        second -= first
-        second *= f
-        second += first
-        return second
+    def reflect(self, hits, near, H, seen):
+        """Put into seen[near] what is reflected there: direct light by its maps, and other irradiance H (m, C)."""
+        kernels.reflect(*self._places, self._direct, self._rho, near, hits.face, hits.a, hits.b, H, seen)
 
 
 def _weighted(value, weight):
@@ -169,34 +134,25 @@ def indirect_light(x, N, shift, K, tracer, mesh, table, channels):
     step = max(1, RAYS_AT_ONCE // K)
     for first in range(0, n, step):
         part = slice(first, first + step)
-        k = len(x[part])
-        D = cosine_directions(N[part], points, shift[part] / (K, 1)).reshape(-1, 3)
-        origins = np.repeat(x[part].astype(np.float32), K, axis=0)
+        origins, D = rays_about(x[part], N[part], points, shift[part] / (K, 1))
         hits = tracer.closest(origins, D)
-        ray = np.arange(k * K)
-        seen = _follow(origins, D, hits, ray, K, shift[part], tracer, mesh, table).reshape(k, K, channels)
-        H[part] = seen.mean(axis=1)
-        all_groups = seen if channels <= 3 else seen.reshape(k, K, -1, 3).sum(axis=2)
-        noise[part] = NOISE * all_groups.std(axis=1).max(axis=1) / K**0.8
-        back = hits.is_back.reshape(k, K)
-        hidden[part] = is_hidden(back, mesh.is_shell(hits.face).reshape(k, K)) if back.any() else False
-        reach[part] = K / (1 / np.maximum(hits.t, 1e-6)).reshape(k, K).sum(axis=1)
-    return IndirectLight(H, hidden, noise, reach)
+        seen = _follow(origins, D, hits, np.arange(len(D)), K, shift[part], tracer, table)
+        kernels.summed(seen, hits.t, K, H[part], noise[part], reach[part])
+        hidden[part] = is_hidden(hits, mesh.in_shell, K)
+    return IndirectLight(H, hidden, NOISE * noise / np.float32(K**0.8), reach)
 
 
-def _follow(origins, D, hits, ray, K, shift, tracer, mesh, table, step=0):
+def _follow(origins, D, hits, ray, K, shift, tracer, table, step=0):
     """Radiosity along rays; near hits are followed by one ray each, at most MOST_STEPS deep.
 
     ray (n,) : number of each, K to a sample, whose shifts (samples, 2) they share.
     """
-    seen = table.all_light(hits)
-    near = np.flatnonzero(table.is_near(hits)) if step < MOST_STEPS else ()
+    seen, near = table.see(hits, step < MOST_STEPS)
     if len(near):
-        there, ray = hits[near], ray[near]
-        N = mesh.normal[there.face]
-        x = (origins[near] + there.t[:, None] * D[near] + N * OFFSET).astype(np.float32)
-        onward = cosine_direction_each(N, path_coordinates(ray % K, shift[ray // K], step + 1))
+        x, onward, ray_on = np.empty((len(near), 3), np.float32), np.empty((len(near), 3), np.float32), ray[near]
+        ends = near, hits.face, hits.t, table.normal, origins, D
+        kernels.onward(*ends, ray, K, shift, *path_steps(step + 1), x, onward, ray_on)
         beyond = tracer.closest(x, onward)
-        H = _follow(x, onward, beyond, ray, K, shift, tracer, mesh, table, step + 1)
-        seen[near] = table.direct_light(there) + table.rho(there) * H
+        H = _follow(x, onward, beyond, ray_on, K, shift, tracer, table, step + 1)
+        table.reflect(hits, near, H, seen)
     return seen

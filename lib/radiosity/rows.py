@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lib.visibility.hemisphere import cosine_directions
+from lib.visibility.hemisphere import rays_about
 from lib.visibility.hidden import RAYS, are_buried, is_hidden
 from lib.visibility.qmc import r2
 from lib.visibility.tracer import MISSED, Hits
@@ -17,7 +17,7 @@ from lib.visibility.tracer import MISSED, Hits
 NOTHING = -1  # the ray left the scene
 ABSORBED = -2  # an emitter, a caster, a back face
 NO_RAY = -3  # its point is hidden
-BATCH = 64  # elements at once
+RAYS_AT_ONCE = 16384
 
 
 @dataclass(frozen=True)
@@ -47,31 +47,25 @@ def element_rows(x, N, shift, R, tracer, mesh, grids, is_part=None):
     is_part = np.ones(x.shape[:2], dtype=bool) if is_part is None else is_part
     m, points = x.shape[:2]
     per_point = max(1, R // points)
-    sequence = r2(per_point * points)
+    # Ray r leaves from point r mod 16, so that every point gets a stretch of the sequence in every direction.
+    sequence = r2(per_point * points).reshape(per_point, points, 2).swapaxes(0, 1)
     entries = np.empty((m, per_point * points), dtype=np.int32)
     met = np.empty(entries.shape, dtype=np.uint8)
     hidden = np.empty((m, points), dtype=bool)
-    for first in range(0, m, BATCH):
-        part = slice(first, first + BATCH)
-        k = len(x[part])
-        # Ray r leaves from point r mod 16, so that every point gets a stretch of the sequence in every direction.
-        normals = N[part].reshape(-1, 3)
-        D = np.empty((k, points, per_point, 3), dtype=np.float32)
-        for p in range(points):
-            D[:, p] = cosine_directions(normals[p::points], sequence[p::points], shift[part])
-        origins = np.repeat(x[part].reshape(-1, 3).astype(np.float32), per_point, axis=0)
-        D, out = D.reshape(-1, 3), np.repeat(~is_part[part].ravel(), per_point)
-        hits = tracer.closest(origins, D) if not out.any() else _of_some(tracer, origins, D, ~out)
+    step = max(1, RAYS_AT_ONCE // entries.shape[1])
+    for first in range(0, m, step):
+        part = slice(first, first + step)
+        k, at, normals = len(x[part]), x[part].reshape(-1, 3), N[part].reshape(-1, 3)
+        origins, D = rays_about(at, normals, sequence, shift[part])
+        cast = is_part[part].ravel()
+        hits = tracer.closest(origins, D) if cast.all() else _of_some(tracer, origins, D, np.repeat(cast, per_point))
         element, point = mesh.element_of(hits, grids)
-        in_shell = mesh.is_shell(hits.face)
-        shape = (k * points, per_point)
-        buried = is_hidden(hits.is_back.reshape(shape), in_shell.reshape(shape))
-        buried |= ~is_part[part].ravel()
-        doubt = np.flatnonzero(buried & is_part[part].ravel()) if per_point < RAYS else ()
+        buried = is_hidden(hits, mesh.in_shell, per_point) | ~cast
+        doubt = np.flatnonzero(buried & cast) if per_point < RAYS else ()
         if len(doubt):
             shifts = np.repeat(shift[part], points, axis=0)[doubt]
-            buried[doubt] = are_buried(x[part].reshape(-1, 3)[doubt], normals[doubt], shifts, tracer, mesh)
-        element = np.where(buried[:, None], NO_RAY, element.reshape(shape))
+            buried[doubt] = are_buried(at[doubt], normals[doubt], shifts, tracer, mesh)
+        element.reshape(-1, per_point)[buried] = NO_RAY
         entries[part], met[part] = element.reshape(k, -1), point.reshape(k, -1)
         hidden[part] = buried.reshape(k, points)
     return Rows(entries, met, hidden)

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from lib.visibility.hemisphere import cosine_directions
+from lib.visibility.hemisphere import rays_about
 from lib.visibility.qmc import r2
+from lib.visibility.ray_kernels import buried
 
 RAYS = 16  # decide for a point: fewer meet back faces alone by chance
 AT_ONCE = 1024  # points
@@ -11,11 +12,11 @@ BURIED_IN_SHELL = 0.10  # share of rays that meet the inside of a closed shell
 BEHIND_ALL = 0.90  # share of rays that meet any back face: the back of an open sheet alone hides nothing
 
 
-def is_hidden(is_back, in_shell, cast=None):
-    """(n,) bool from rays (n, K): is_back, the ray meets a back face; in_shell, that face is part of a closed shell."""
-    rays = is_back.shape[1] if cast is None else np.maximum(cast, 1)
-    inside = (is_back & in_shell).sum(axis=1)
-    return (inside > BURIED_IN_SHELL * rays) | (is_back.sum(axis=1) > BEHIND_ALL * rays)
+def is_hidden(hits, in_shell, K):
+    """(n,) bool from the hits of K rays of each of n points; in_shell (faces,) bool, part of a closed shell."""
+    out = np.empty(len(hits.face) // K, dtype=bool)
+    buried(hits.face, hits.is_back, in_shell, K, BURIED_IN_SHELL, BEHIND_ALL, out)
+    return out
 
 
 def are_buried(x, N, shift, tracer, mesh):
@@ -26,8 +27,6 @@ def are_buried(x, N, shift, tracer, mesh):
     sequence = r2(RAYS)
     for first in range(0, len(x), AT_ONCE):
         part = slice(first, first + AT_ONCE)
-        D = cosine_directions(N[part], sequence, shift[part])
-        hits = tracer.closest(np.repeat(x[part].astype(np.float32), RAYS, axis=0), D.reshape(-1, 3))
-        shape = (len(x[part]), RAYS)
-        out[part] = is_hidden(hits.is_back.reshape(shape), mesh.is_shell(hits.face).reshape(shape))
+        hits = tracer.closest(*rays_about(x[part], N[part], sequence, shift[part]))
+        out[part] = is_hidden(hits, mesh.in_shell, RAYS)
     return out

@@ -3,6 +3,7 @@
 import numpy as np
 
 from lib.elements.grids import POINTS
+from lib.visibility.ray_kernels import elements_met
 
 
 class MeshLookup:
@@ -14,7 +15,7 @@ class MeshLookup:
     """
 
     def __init__(self, V, F, UV, face_surface, in_shell, back_of=None):
-        self.face_surface, in_shell = np.asarray(face_surface), np.asarray(in_shell, dtype=bool)
+        self.face_surface, in_shell = np.asarray(face_surface, dtype=np.int64), np.asarray(in_shell, dtype=bool)
         corners = np.asarray(UV, dtype=np.float64)[np.asarray(F)]
         self._uv = np.stack([corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=1)
         V = np.asarray(V, dtype=np.float64)
@@ -27,30 +28,17 @@ class MeshLookup:
             self.face_surface = np.concatenate([self.face_surface, np.where(behind >= 0, behind, self.face_surface)])
             self._uv, self.normal = np.concatenate([self._uv, self._uv]), np.concatenate([self.normal, -self.normal])
             in_shell = np.concatenate([in_shell, in_shell])
-        self._is_shell = np.append(in_shell, False)
-
-    def is_shell(self, face):
-        """(n,) bool: the face belongs to a closed shell; False for -1."""
-        return self._is_shell[face]
+        self.in_shell = in_shell
 
     def element_of(self, hits, grids):
         """Element number of each hit (n,) int32: -1 where nothing was met, -2 on back faces and surfaces without
         elements; and which of the element's 16 points is nearest (n,) uint8.
         """
-        met = hits.face >= 0
-        face = np.where(met, hits.face, 0)
-        if not len(self.face_surface):
-            return np.full(len(face), -1, dtype=np.int32), np.zeros(len(face), dtype=np.uint8)
-        surface = self.face_surface[face]
-        corners = self._uv[face]
-        uv = corners[:, 0] + hits.a[:, None] * corners[:, 1] + hits.b[:, None] * corners[:, 2]
-        n_u, n_v = grids.n_u[surface], grids.n_v[surface]
-        i = np.clip((uv[:, 0] * n_u * POINTS).astype(np.int64), 0, np.maximum(POINTS * n_u - 1, 0))
-        j = np.clip((uv[:, 1] * n_v * POINTS).astype(np.int64), 0, np.maximum(POINTS * n_v - 1, 0))
-        element = grids.first[surface] + j // POINTS * n_u + i // POINTS
-        point = (j % POINTS * POINTS + i % POINTS).astype(np.uint8)
-        element = np.where(hits.is_back | (n_u == 0), -2, element)
-        return np.where(met, element, -1).astype(np.int32), point
+        element = np.empty(len(hits.face), dtype=np.int32)
+        point = np.empty(len(hits.face), dtype=np.uint8)
+        faces = hits.face, hits.a, hits.b, hits.is_back, self.face_surface, self._uv
+        elements_met(*faces, grids.n_u, grids.n_v, grids.first, POINTS, element, point)
+        return element, point
 
     def texel_coordinates(self, width, height):
         """Faces in texel units of their surface's map: (m + 1, 6) float32 rows s, t, ds_a, dt_a, ds_b, dt_b; the last

@@ -1,7 +1,6 @@
 """The hard cases notice when the code is broken on purpose: each breakage, and the case that must fail."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -17,12 +16,12 @@ from stages import shoot, tessellate
 def no_receiver_cosine(patch):
     """Gather rays and element rays uniform over the hemisphere."""
 
-    def uniform(N, points, shift):
-        stretched = np.stack([1 - (1 - points[:, 0]) ** 2, points[:, 1]], axis=1)
-        return hemisphere.cosine_directions(N, stretched, np.stack([0 * shift[:, 0], shift[:, 1]], axis=1))
+    def uniform(x, N, points, shift):
+        stretched = np.stack([1 - (1 - points[..., 0]) ** 2, points[..., 1]], axis=-1)
+        return hemisphere.rays_about(x, N, stretched, np.stack([0 * shift[:, 0], shift[:, 1]], axis=1))
 
     for module in (gather, rows):
-        patch.setattr(module, "cosine_directions", uniform)
+        patch.setattr(module, "rays_about", uniform)
 
 
 def no_emitter_cosine(patch):
@@ -55,9 +54,9 @@ def no_clipping(patch):
 
 def nothing_hidden(patch):
     """No sample counts as buried."""
-    none = lambda is_back, *_: np.zeros(len(is_back), dtype=bool)  # noqa: E731
     for module in (hidden, gather, rows):
-        patch.setattr(module, "is_hidden", none)
+        patch.setattr(module, "is_hidden", lambda hits, in_shell, K: np.zeros(len(hits.face) // K, dtype=bool))
+    none = lambda x, *_: np.zeros(len(x), dtype=bool)  # noqa: E731
     for module in (sampling, rows):
         patch.setattr(module, "are_buried", none)
 
@@ -76,13 +75,12 @@ def rows_that_sum_to_one(patch):
 
 def light_from_behind(patch):
     """Rays see the radiosity of a surface from its back too."""
-    look_up = gather.LookupTable._look_up
+    see = gather.LookupTable.see
 
-    def both(self, texels, hits):
-        front = SimpleNamespace(face=hits.face, a=hits.a, b=hits.b, t=hits.t, is_back=np.zeros_like(hits.is_back))
-        return look_up(self, texels, front)
+    def both(self, hits, follows):
+        return see(self, replace(hits, is_back=np.zeros_like(hits.is_back)), follows)
 
-    patch.setattr(gather.LookupTable, "_look_up", both)
+    patch.setattr(gather.LookupTable, "see", both)
 
 
 def through_walls(patch):

@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 
 from lib.visibility import qmc
-from lib.visibility.hemisphere import cosine_direction_each, cosine_directions, tangent_frames
+from lib.visibility.hemisphere import cosine_direction_each, rays_about
 from lib.visibility.hidden import is_hidden
-from lib.visibility.qmc import R2_STEP, path_coordinates, r2, shift, stream
+from lib.visibility.qmc import R2_STEP, path_steps, r2, shift, stream
+from lib.visibility.tracer import Hits
 from tests.tolerances import EXACT, FLOAT32, STANDARD_ERRORS
 
 NORMALS = np.concatenate([np.eye(3), -np.eye(3), np.random.default_rng(3).normal(size=(40, 3))])
@@ -18,13 +19,43 @@ def mean_and_error(values):
     return values.mean(), values.std(ddof=1) / np.sqrt(len(values))
 
 
-def test_frames_are_orthonormal_and_right_handed():
-    near_pole = np.array([[1e-9, 0, -1.0], [0, -1e-9, -1.0], [1e-5, 1e-5, 1.0]])
+def cosine_directions(N, points, shift):
+    """Directions about each normal, (m, K, 3)."""
+    return rays_about(N, N, points, shift)[1].reshape(len(N), len(points), 3)
+
+
+def plain_directions(N, points):
+    """Malley's method, one normal and one point at a time, in any frame that is orthonormal: (m, 3)."""
+    out = []
+    for n, (r2_, turn) in zip(N, points, strict=True):
+        sign = -1.0 if n[2] < -1e-5 else 1.0
+        half = np.array([n[0], n[1], n[2] + sign])  # the pole is mirrored into n
+        mirror = 2 * np.outer(half, half) / (half @ half) - np.eye(3)
+        r, phi = np.sqrt(r2_), 2 * np.pi * turn
+        x, y = r * np.cos(phi), r * np.sin(phi)
+        out.append(mirror @ [-x, -sign * y, sign * np.sqrt(1 - r2_)])
+    return np.array(out)
+
+
+def test_directions_by_a_reflection():
+    """Duff's frame is the reflection of the pole into the normal; poles and normals next to them among them."""
+    near_pole = np.array([[1e-9, 0, -1.0], [0, -1e-9, -1.0], [1e-5, 1e-5, 1.0], [1, 0, -1e-6], [1, 0, -1e-4]])
     N = np.concatenate([NORMALS, near_pole / np.linalg.norm(near_pole, axis=1)[:, None]])
-    frames = tangent_frames(N)
-    assert np.abs(frames @ np.swapaxes(frames, 1, 2) - np.eye(3)).max() < EXACT
-    assert np.abs(np.linalg.det(frames) - 1).max() < EXACT
-    assert np.array_equal(frames[:, 2], N)
+    points = np.random.default_rng(8).random((len(N), 2))
+    expected = plain_directions(N, points)
+    assert np.abs(cosine_directions(N, np.zeros((1, 2)), points)[:, 0] - expected).max() < FLOAT32
+    assert np.abs(cosine_direction_each(N, points) - expected).max() < 4 * FLOAT32
+
+
+def test_rays_of_groups_share_their_shift_and_each_has_its_points():
+    """Normal i takes points[i % P] and shift[i // P]; rays of a normal lie together and leave from its point."""
+    rng = np.random.default_rng(6)
+    x, points, shifts = rng.random((6, 3)), rng.random((3, 5, 2)), rng.random((2, 2))
+    origins, D = rays_about(x, NORMALS[:6], points, shifts)
+    assert np.array_equal(origins, np.repeat(x.astype(np.float32), 5, axis=0))
+    for i in range(6):
+        alone = rays_about(x[i : i + 1], NORMALS[i : i + 1], points[i % 3], shifts[i // 3 : i // 3 + 1])[1]
+        assert np.array_equal(D[5 * i : 5 * i + 5], alone)
 
 
 def test_directions_are_unit_and_above_the_plane():
@@ -114,13 +145,13 @@ def test_streams_keep_seed_and_name_apart():
     assert len({stream(seed, name) for seed in (1, 11, "1 rows") for name in ("1", "floor", "1floor", "")}) == 12
 
 
-BACK = np.zeros((1, 20), dtype=bool)
-
-
-def rays(back, shell):
-    """One point's 20 rays: `back` of them meet back faces, `shell` of those inside a closed shell."""
-    is_back = np.arange(20) < back
-    return is_back[None], (np.arange(20) < shell)[None]
+def hits(back, shell):
+    """One point's 20 rays: `back` of them meet back faces, `shell` of those inside a closed shell; the first of others
+    miss.  With which faces are of a shell: Hits, (2,) bool."""
+    number = np.arange(20)
+    face = np.where(number < shell, 1, np.where((number >= back) & (number % 2 == 0), -1, 0)).astype(np.int32)
+    none = np.zeros(20, dtype=np.float32)
+    return Hits(face, none, none, number < back, none), np.array([False, True])
 
 
 @pytest.mark.parametrize(
@@ -137,28 +168,20 @@ def rays(back, shell):
     ],
 )
 def test_hidden_by_shells_at_a_tenth_and_by_sheets_at_nine_tenths(back, shell, expected):
-    assert is_hidden(*rays(back, shell)).tolist() == [expected]
+    assert is_hidden(*hits(back, shell), 20).tolist() == [expected]
 
 
 def test_front_faces_of_shells_hide_nothing():
-    assert not is_hidden(BACK, ~BACK).any()
-
-
-def test_one_direction_each_is_the_first_of_many():
-    """The direct formula against the general one, for normals all round, the poles of the frame among them."""
-    rng = np.random.default_rng(5)
-    N = np.concatenate([rng.normal(size=(500, 3)), [[0, 0, 1.0], [0, 0, -1.0], [1.0, 0, 0]]])
-    N /= np.linalg.norm(N, axis=1)[:, None]
-    points = rng.random((len(N), 2))
-    many = cosine_directions(N, np.zeros((1, 2)), points)[:, 0]
-    assert np.abs(cosine_direction_each(N, points) - many).max() < 4 * FLOAT32
+    none = np.zeros(20, dtype=np.float32)
+    fronts = Hits(np.zeros(20, dtype=np.int32), none, none, np.zeros(20, dtype=bool), none)
+    assert not is_hidden(fronts, np.array([True]), 20).any()
 
 
 def test_steps_of_a_path_do_not_know_each_other():
     """Over all turns of a sample every pair of coordinates, the first direction's too, is uniform on the square."""
     turns = shift(stream(1, "path"), *(a.ravel() for a in np.indices((200, 200))))
-    k = np.full(len(turns), 5)
-    all_of_them = np.concatenate([turns, *(path_coordinates(k, turns, step) for step in (1, 2, 3, 4))], axis=1)
+    steps = (path_steps(number) for number in (1, 2, 3, 4))
+    all_of_them = np.concatenate([turns, *((5 * step + turns @ turn.T) % 1 for step, turn in steps)], axis=1)
     for a in range(10):
         for b in range(a):
             cells = np.histogram2d(all_of_them[:, a], all_of_them[:, b], bins=8, range=[[0, 1], [0, 1]])[0]

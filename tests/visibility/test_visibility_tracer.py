@@ -146,7 +146,7 @@ def test_elements_of_a_finer_grid():
 
 def test_shells_and_normals():
     mesh, _ = lookup(shell=(-1, 3))
-    assert mesh.is_shell(np.array([0, 1, -1])).tolist() == [False, True, False]
+    assert mesh.in_shell.tolist() == [False, True]
     assert mesh.normal.tolist() == [[0, 0, 1], [0, 0, 1]]
 
 

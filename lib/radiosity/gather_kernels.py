@@ -1,0 +1,125 @@
+"""Compiled loops of the final gather: what rays see in the radiosity maps, and the rays that follow near hits.
+
+Arrays of rays hold those of a sample together.  `faces` (f, 8) are rows s, t, ds_a, dt_a, ds_b, dt_b, last_i, last_j in
+texels of the map of each face's surface; `corner` (f,) its first texel, `width` (f,) texels of its rows; texels
+(total, C + 1) hold weight times radiosity, and the weight.  Every kernel writes into arrays it is given.
+"""
+
+import numpy as np
+
+from lib.compiled import compiled, inlined
+from lib.elements.lattice import OFFSET
+from lib.visibility.ray_kernels import TURN, cosine_direction
+
+NONE, ONE = np.float32(0), np.float32(1)
+CLOSEST = np.float32(1e-6)
+
+
+@inlined
+def look_up(faces, corner, width, texels, face, a, b, out, row):
+    """Put the mean radiosity of the four texels round a hit, by bilinear weights, into out[row, :]."""
+    s = faces[face, 0] + a * faces[face, 2] + b * faces[face, 4]
+    t = faces[face, 1] + a * faces[face, 3] + b * faces[face, 5]
+    i = min(max(np.floor(s), NONE), faces[face, 6])
+    j = min(max(np.floor(t), NONE), faces[face, 7])
+    f, g = s - i, t - j
+    first = corner[face] + np.int64(j) * width[face] + np.int64(i)
+    above = first + width[face]
+    last = texels.shape[1] - 1
+    weight = NONE
+    for back in range(last + 1):
+        c = last - back  # the weight is the last column, and comes first
+        low = texels[first, c] + f * (texels[first + 1, c] - texels[first, c])
+        high = texels[above, c] + f * (texels[above + 1, c] - texels[above, c])
+        value = low + g * (high - low)
+        if back == 0:
+            weight = ONE / value if value > NONE else ONE
+        else:
+            out[row, c] = value * weight
+
+
+@compiled(
+    "f4[:,:], i8[:], i8[:], f4[:,:], f4[:], i4[:], f4[:], f4[:], f4[:], b1[:], i8, f4[:,:], i8[:]",
+)
+def see(faces, corner, width, texels, near, face, a, b, t, is_back, follows, seen, chosen):
+    """Radiosity seen (n, C) by rays, 0 for misses and back faces.
+
+    near (f,) : front hits nearer than that are not looked up but listed in chosen (n,), if follows; returns how many.
+    """
+    n_chosen = 0
+    for r in range(len(face)):
+        if face[r] < 0 or is_back[r]:
+            for c in range(seen.shape[1]):
+                seen[r, c] = NONE
+        elif follows and t[r] < near[face[r]]:
+            chosen[n_chosen] = r
+            n_chosen += 1
+        else:
+            look_up(faces, corner, width, texels, face[r], a[r], b[r], seen, r)
+    return n_chosen
+
+
+@compiled(
+    "i8[:], i4[:], f4[:], f8[:,:], f4[:,:], f4[:,:], i8[:], i8, f8[:,:], f8[:], f8[:,:], f4[:,:], f4[:,:], i8[:]",
+)
+def onward(chosen, face, t, normal, origins, D, ray, K, shift, step, turn, origins_on, D_on, ray_on):
+    """One cosine ray each from the hits of the chosen rays.
+
+    chosen (m,) of rays with origins, D (n, 3) and numbers ray (n,), K to a sample of shifts (samples, 2)
+    normal (f, 3) of the faces; step (2,), turn (2, 2) as in `qmc.path_steps`; origins_on, D_on, ray_on (m,) come back.
+    """
+    for m in range(len(chosen)):
+        r = chosen[m]
+        f, number = face[r], ray[r]
+        x, y, z = normal[f, 0], normal[f, 1], normal[f, 2]
+        k, sample = number % K, number // K
+        p = k * step[0] + shift[sample, 0] * turn[0, 0] + shift[sample, 1] * turn[0, 1]
+        q = k * step[1] + shift[sample, 0] * turn[1, 0] + shift[sample, 1] * turn[1, 1]
+        p, q = np.float32(p - np.floor(p)), np.float32(q - np.floor(q))
+        dx, dy, dz = cosine_direction(np.float32(x), np.float32(y), np.float32(z), p, TURN * q)
+        D_on[m, 0], D_on[m, 1], D_on[m, 2] = dx, dy, dz
+        origins_on[m, 0] = origins[r, 0] + t[r] * D[r, 0] + x * OFFSET
+        origins_on[m, 1] = origins[r, 1] + t[r] * D[r, 1] + y * OFFSET
+        origins_on[m, 2] = origins[r, 2] + t[r] * D[r, 2] + z * OFFSET
+        ray_on[m] = number
+    return 0
+
+
+@compiled("f4[:,:], i8[:], i8[:], f4[:,:], f4[:,:], i8[:], i4[:], f4[:], f4[:], f4[:,:], f4[:,:]")
+def reflect(faces, corner, width, direct, rho, chosen, face, a, b, H, seen):
+    """Radiosity seen by the chosen rays: direct light by its maps, and rho (f, C) times the irradiance H (m, C)."""
+    for m in range(len(chosen)):
+        r = chosen[m]
+        look_up(faces, corner, width, direct, face[r], a[r], b[r], seen, r)
+        for c in range(seen.shape[1]):
+            seen[r, c] += rho[face[r], c] * H[m, c]
+    return 0
+
+
+@compiled("f4[:,:], f4[:], i8, f4[:,:], f4[:], f4[:]")
+def summed(seen, t, K, H, deviation, reach):
+    """Over the K rays of each sample: mean of seen (n K, C), H (n, C); standard deviation, all groups of three channels
+    together, largest of the three, (n,); harmonic mean of the distances t, (n,)."""
+    C = seen.shape[1]
+    for i in range(len(H)):
+        first, largest = i * K, 0.0
+        for c in range(min(C, 3)):
+            total, square = 0.0, 0.0
+            for r in range(first, first + K):
+                value = 0.0
+                for g in range(c, C, 3):
+                    value += seen[r, g]
+                total += value
+                square += value * value
+            largest = max(largest, (square - total * total / K) / K)
+            for g in range(c, C, 3):
+                own = 0.0
+                for r in range(first, first + K):
+                    own += seen[r, g]
+                H[i, g] = own / K
+        nearness = 0.0
+        for r in range(first, first + K):
+            nearness += ONE / max(t[r], CLOSEST)
+        deviation[i] = np.sqrt(largest)
+        reach[i] = K / nearness
+    return 0
