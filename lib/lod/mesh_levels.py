@@ -10,8 +10,8 @@ import numpy as np
 
 from lib.lod.collapse import History
 from lib.lod.thinned import Thinned
-from lib.surfaces.closed import places
 from lib.surfaces.pieces import pieces
+from lib.surfaces.rows import numbered
 
 STEP = 2.0  # times fewer triangles, from one measured level to the next
 NEAR = 1.1  # times more triangles than needed is near enough
@@ -244,6 +244,6 @@ class MeshLevels:
 def touching(meshes):
     """Groups of meshes that share positions bit for bit, directly or by others: a list of (k,) ascending numbers."""
     owner = np.repeat(np.arange(len(meshes)), [len(mesh.V) for mesh in meshes])
-    place = len(meshes) + places(np.concatenate([mesh.V for mesh in meshes]))
-    group = pieces(int(place.max()) + 1, owner, place)[: len(meshes)]
+    place, first = numbered(np.concatenate([mesh.V for mesh in meshes]))
+    group = pieces(len(meshes) + len(first), owner, len(meshes) + place)[: len(meshes)]
     return [np.flatnonzero(group == k) for k in np.unique(group)]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lib.maps.colour import linear_to_srgb, srgb_to_linear
-from lib.surfaces.closed import places
+from lib.surfaces.rows import numbered
 from lib.visibility import closest
 
 RAYS_AT_ONCE = 1 << 17
@@ -89,7 +89,7 @@ def _twins(corner):
     twin, order = np.full(n, -1), np.zeros((n, 3), dtype=np.int64)
     if not n:
         return twin, order
-    place = places(corner.reshape(-1, 3)).reshape(n, 3)
+    place = numbered(corner.reshape(-1, 3))[0].reshape(n, 3)
     order = np.argsort(place, axis=1, kind="stable")
     same = np.unique(np.take_along_axis(place, order, axis=1), axis=0, return_inverse=True)[1].ravel()
     by = np.argsort(same, kind="stable")

@@ -3,16 +3,7 @@
 import numpy as np
 
 from lib.surfaces.pieces import pieces
-
-
-def places(S):
-    """Number of the position (k,) int64 of points S (k, 3): equal bit for bit, but for the sign of zero."""
-    S = np.ascontiguousarray(np.asarray(S, dtype=np.float64) + 0.0)
-    order = np.lexsort(S.T)
-    is_new = np.concatenate([[False], (S[order[1:]] != S[order[:-1]]).any(axis=1)])[: len(S)]
-    out = np.empty(len(S), dtype=np.int64)
-    out[order] = np.cumsum(is_new)
-    return out
+from lib.surfaces.rows import numbered
 
 
 def in_closed_shell(V, F):
@@ -25,7 +16,7 @@ def in_closed_shell(V, F):
     F = np.asarray(F, dtype=np.int64)
     if not len(F):
         return np.zeros(0, dtype=bool)
-    ends = places(V)[F]
+    ends = numbered(V)[0][F]
     a, b = ends.ravel(), np.roll(ends, -1, axis=1).ravel()
     face = np.repeat(np.arange(len(F)), 3)
     key = np.minimum(a, b) * len(V) + np.maximum(a, b)

@@ -4,10 +4,10 @@ import numpy as np
 
 from lib.nurbs import borders as find_borders
 from lib.nurbs.surface import NurbsSurface
-from lib.surfaces.closed import places
 from lib.surfaces.loops import following
 from lib.surfaces.measure import collapsed_sides, is_closed
 from lib.surfaces.pieces import pieces
+from lib.surfaces.rows import numbered
 from lib.surfaces.trimmed import TrimmedSurface
 
 ROUND = np.array([-1, 1, 1, -1])  # sides u = 0, u = 1, v = 0, v = 1: along their parameter counterclockwise?
@@ -45,7 +45,7 @@ def _of_trimmed(surfaces):
     own = [s for s, surface in enumerate(surfaces) if isinstance(surface, TrimmedSurface)]
     if not own:
         return _nothing()
-    point = places(np.concatenate([surfaces[s].S for s in own]))
+    point, _ = numbered(np.concatenate([surfaces[s].S for s in own]))
     begin = np.cumsum([0, *(len(surfaces[s].S) for s in own)])
     after = np.concatenate([following(surfaces[s].loop_start) + k for s, k in zip(own, begin[:-1], strict=True)])
     owner = np.repeat(own, np.diff(begin))

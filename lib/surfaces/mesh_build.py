@@ -10,6 +10,7 @@ import numpy as np
 
 from lib.surfaces.mesh import Flat, Mesh
 from lib.surfaces.pieces import pieces
+from lib.surfaces.rows import numbered
 
 CREASE = 40.0  # degrees; what tessellated round things fold by is less, what is meant as an edge is more
 FLAT = 1e-10  # height over longest edge of a triangle without an area: far above rounding in float64
@@ -92,18 +93,9 @@ def mesh(V, F, N=None, T=None, crease=CREASE):
 
 def welded(V, F):
     """Positions equal bit for bit made one: (V, F) with the positions that F uses, in the order it first uses them."""
-    used, F = np.unique(F, return_inverse=True)
-    V, F = V[used], F.reshape(-1, 3)
-    order = np.lexsort(V.T)
-    is_new = np.concatenate([[True], (np.diff(V[order], axis=0) != 0).any(axis=1)])[: len(V)]
-    group = np.empty(len(V), dtype=np.int64)
-    group[order] = np.cumsum(is_new) - 1
-    V, F = V[order][is_new], group[F]
-    _, first, inverse = np.unique(F, return_index=True, return_inverse=True)
-    rank = np.empty(len(first), dtype=np.int64)
-    by_use = np.argsort(first)
-    rank[by_use] = np.arange(len(first))
-    return V[by_use], rank[inverse].reshape(-1, 3)
+    corner = V[F.ravel()]
+    number, first = numbered(corner)
+    return corner[first], number.reshape(-1, 3)
 
 
 def normals_areas(V, F):

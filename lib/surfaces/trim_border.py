@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lib.surfaces.closed import places
 from lib.surfaces.loops import following
+from lib.surfaces.rows import numbered
 
 SHAPE = 0.15  # of an edge's length: points that stand out by more are kept, so that arcs and rings stay recognisable
 
@@ -63,7 +63,7 @@ def borders(surfaces):
     loops = np.concatenate([s.loop_start[:-1] + first for s, first in zip(surfaces, start, strict=False)])
     after = following(np.append(loops, start[-1]))
     significance = np.concatenate([s.significance for s in surfaces])
-    place = places(S)
+    place, _ = numbered(S)
     edge = _edges(significance, loops, len(S))
     length = np.bincount(edge, np.linalg.norm(S[after] - S, axis=1))
     cap = np.full(place.max(initial=-1) + 1, np.inf)
