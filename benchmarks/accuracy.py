@@ -14,10 +14,11 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from benchmarks.hard_cases import closed, curved, lamps, near, resampling, scale, shadows  # noqa: E402
+from benchmarks.hard_cases import closed, contacts, curved, lamps, near, resampling, scale, seams, shadows  # noqa: E402
 from benchmarks.hard_cases.bench import Bench  # noqa: E402
 
-CASES = {f.__name__: f for topic in (closed, near, shadows, curved, lamps, scale, resampling) for f in topic.CASES}
+TOPICS = closed, near, shadows, contacts, curved, seams, lamps, scale, resampling
+CASES = {f.__name__: f for topic in TOPICS for f in topic.CASES}
 HEAD = """# Accuracy on hard cases
 
 Made by `make accuracy`: each case baked through the stages at the default settings (tolerance 1 %). Errors are

@@ -7,6 +7,8 @@ import pytest
 
 from benchmarks import accuracy
 from benchmarks.hard_cases.bench import Bench
+from lib.elements import quadtree
+from lib.elements.lattice import Lattice
 from lib.maps import emission
 from lib.radiosity import form_factors, gather, rows, sampling, shooting
 from lib.visibility import hemisphere, hidden
@@ -101,7 +103,19 @@ def mirrored_pictures(patch):
     patch.setattr("lib.maps.emission.merged", lambda mean, area, tolerance: merged(mean[:, ::-1], area, tolerance))
 
 
+def no_cells_along_contacts(patch):
+    """Where hidden and visible samples meet nothing is divided."""
+    patch.setattr(quadtree.Quadtree, "_is_contact", lambda self, level: False)
+
+
+def open_seams(patch):
+    """Both ends of a closed surface's map are measured on their own, as if it were open."""
+    patch.setattr("lib.radiosity.world.Lattice", lambda roots, closed, collapsed: Lattice(roots))
+
+
 BROKEN = {
+    no_cells_along_contacts: "contact_edges",
+    open_seams: "seams",
     even_pictures: "textured_emitter",
     mirrored_pictures: "textured_emitter",
     no_receiver_cosine: "spheres",
