@@ -165,5 +165,6 @@ def _run(name, request, streams, sockets):
 
 
 if __name__ == "__main__":
+    import numpy.ma  # noqa: F401  what numpy itself loads when a job first sorts
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the jobs hear it, and Snakemake, which ends this process
     Jobs(socket.socket(fileno=int(sys.argv[1]))).serve(sys.stdin)
