@@ -9,7 +9,7 @@ as the map's spacing there, for its bilinear value at T (Williams 1983).
 import numpy as np
 
 from lib.maps.pixels import bilinear, box_means
-from lib.surfaces.domain import Domain, barycentric
+from lib.surfaces.domain import Domain, barycentric, corners_of
 from lib.surfaces.measure import corners
 from lib.visibility.qmc import r2
 
@@ -101,7 +101,7 @@ def evaluate(mesh, picture, repeat, w, h):
     mesh, where rho is 0.  Crossings beside a chart hold what its border has nearest to them.
     """
     domain, pyramid = Domain(mesh.uv, mesh.chart, (w - 1, h - 1)), Pyramid(picture)
-    needed = _corners_of(domain.cover(h - 1, w - 1)[0])
+    needed = corners_of(domain.cover(h - 1, w - 1)[0])
     T = mesh.T * np.asarray(repeat, dtype=np.float64)
     width = pixels_per_map(mesh, pyramid.size, repeat, (w - 1, h - 1))
     rho = np.zeros((h, w, 3), dtype=np.float32)
@@ -116,16 +116,6 @@ def evaluate(mesh, picture, repeat, w, h):
         at = np.einsum("nk,nkc->nc", barycentric(mesh.uv[face], uv), T[face])
         rho[j, i] = np.clip(pyramid.values(at, width[face]), 0, 1)
     return rho, ~needed
-
-
-def _corners_of(cells):
-    """(rows + 1, columns + 1) bool: corners of cells (rows, columns) that are True."""
-    rows, columns = cells.shape
-    corner = np.zeros((rows + 1, columns + 1), dtype=bool)
-    for dj in (0, 1):
-        for di in (0, 1):
-            corner[dj : dj + rows, di : di + columns] |= cells
-    return corner
 
 
 def pixels_per_map(mesh, size, repeat, cells=(1, 1)):

@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 import xatlas
 
+from lib.surfaces.loops import double_area
 from lib.surfaces.mesh_build import normals_areas
 from lib.surfaces.pieces import pieces
 
@@ -295,5 +296,4 @@ def _boxes(flat, chart, n):
 
 
 def _signed_areas(flat):
-    a, b = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
-    return (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / 2
+    return double_area(*flat.swapaxes(0, 1)) / 2

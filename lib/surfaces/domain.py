@@ -163,10 +163,7 @@ class Domain:
         needed = chart >= 0
         if self.is_single or not needed.any():
             return needed, np.zeros_like(needed)
-        corner = np.zeros((rows + 1, columns + 1), dtype=bool)
-        for dj in (0, 1):
-            for di in (0, 1):
-                corner[dj : dj + rows, di : di + columns] |= needed
+        corner = corners_of(needed)
         j, i = np.nonzero(corner)
         owner = np.full(corner.shape, -1, dtype=np.int64)
         owner[j, i] = self.chart_at(np.stack([i / columns, j / rows], axis=1))
@@ -175,6 +172,16 @@ class Domain:
             for di in (0, 1):
                 straddling |= owner[dj : dj + rows, di : di + columns] != chart
         return needed, straddling & needed
+
+
+def corners_of(cells):
+    """(rows + 1, columns + 1) bool: corners of cells (rows, columns) that are True."""
+    rows, columns = cells.shape
+    corner = np.zeros((rows + 1, columns + 1), dtype=bool)
+    for dj in (0, 1):
+        for di in (0, 1):
+            corner[dj : dj + rows, di : di + columns] |= cells
+    return corner
 
 
 def barycentric(corner, uv):

@@ -9,6 +9,7 @@ import numpy as np
 
 from lib.nurbs import evaluate
 from lib.surfaces.domain import Domain, barycentric
+from lib.surfaces.loops import signed_area
 from lib.surfaces.mesh import Mesh
 from lib.surfaces.trimmed import TrimmedSurface
 
@@ -32,8 +33,7 @@ def is_whole(trim):
     """True if the loops of a trimmed surface go round its whole box."""
     if len(trim.loop_start) > 2:
         return False
-    u, v = trim.uv.T
-    return abs(u @ np.roll(v, -1) - v @ np.roll(u, -1)) / 2 > 1 - 1e-9
+    return abs(signed_area(trim.uv)) > 1 - 1e-9
 
 
 def whole(surface):

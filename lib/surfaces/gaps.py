@@ -4,6 +4,7 @@ import numpy as np
 
 from lib.nurbs import borders as find_borders
 from lib.nurbs.surface import NurbsSurface
+from lib.surfaces.loops import corner_runs
 from lib.surfaces.trimmed import TrimmedSurface
 
 
@@ -74,15 +75,7 @@ class _Rows:
 
 def runs(trim):
     """Positions of the border from corner to corner, the runs that `side` of a trimmed surface's Patch goes along."""
-    out = []
-    for a, b in zip(trim.loop_start[:-1], trim.loop_start[1:], strict=True):
-        corner = np.flatnonzero(np.isinf(trim.significance[a:b]))
-        corner = corner if corner.size else np.array([0])
-        S = np.roll(trim.S[a:b], -corner[0], axis=0)
-        S = np.concatenate([S, S[:1]])
-        bounds = np.append(corner - corner[0], b - a)
-        out += [S[i : j + 1] for i, j in zip(bounds[:-1], bounds[1:], strict=True)]
-    return out
+    return [trim.S[run] for run in corner_runs(trim)]
 
 
 def _length(run):

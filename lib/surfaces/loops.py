@@ -12,6 +12,35 @@ def following(loop_start):
     return after
 
 
+def corner_runs(trim):
+    """Border points (k,) of each run of a TrimmedSurface from corner to corner, both among them; a loop without a
+    corner is one run from its first point round to that."""
+    out = []
+    for a, b in zip(trim.loop_start[:-1], trim.loop_start[1:], strict=True):
+        corner = np.flatnonzero(np.isinf(trim.significance[a:b]))
+        corner = corner if corner.size else np.array([0])
+        loop = np.roll(np.arange(a, b), -corner[0])
+        loop = np.append(loop, loop[0])
+        bounds = np.append(corner - corner[0], b - a)
+        out += [loop[i : j + 1] for i, j in zip(bounds[:-1], bounds[1:], strict=True)]
+    return out
+
+
+def signed_area(uv):
+    """Area of a polygon (k, 2), > 0 if it runs counterclockwise.
+
+    >>> float(signed_area(np.array([[0, 0], [2, 0], [2, 1], [0, 1.0]])))
+    2.0
+    """
+    x, y = (uv - uv[0]).T
+    return (x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+
+def double_area(a, b, c):
+    """Twice the area of triangles (..., 2) in the plane, > 0 where they run counterclockwise."""
+    return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0])
+
+
 def inside(trim, uv):
     """(n,) bool: the points uv (n, 2) lie inside the loops of a TrimmedSurface; those on the border on either side."""
     return inside_loops(trim.uv, trim.uv[following(trim.loop_start)], uv)

@@ -10,6 +10,7 @@ import numpy as np
 from lib.nurbs.crop import cropped
 from lib.nurbs.evaluate import point
 from lib.nurbs.shape import collapsed_sides, is_closed, size
+from lib.surfaces.loops import inside_loops, signed_area
 from lib.surfaces.trimmed import TrimmedSurface
 
 SNAP = 1e-6  # of the domain or box: a parameter so near a border is the border
@@ -130,25 +131,6 @@ def trimmed(surface, loops):
     )
 
 
-def signed_area(uv):
-    """Area of a polygon (k, 2), > 0 if it runs counterclockwise.
-
-    >>> float(signed_area(np.array([[0, 0], [2, 0], [2, 1], [0, 1.0]])))
-    2.0
-    """
-    x, y = (uv - uv[0]).T
-    return (x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
-
-
-def contains(polygon, points):
-    """(m,) bool: points (m, 2) inside a polygon (k, 2), by crossings of a ray along u."""
-    a, b = polygon, np.roll(polygon, -1, axis=0)
-    x, y = points[:, :1], points[:, 1:]
-    spans = (a[:, 1] > y) != (b[:, 1] > y)
-    rise = np.where(a[:, 1] == b[:, 1], 1.0, b[:, 1] - a[:, 1])
-    return ((spans & (x < a[:, 0] + (y - a[:, 1]) / rise * (b[:, 0] - a[:, 0]))).sum(axis=1) % 2).astype(bool)
-
-
 class _About:
     """A surface with what its loops need to know of it."""
 
@@ -217,8 +199,9 @@ class _About:
 
     def inside(self, uv, around, number):
         """A hole's uv moved by whole periods into the outer loop; ValueError if it does not lie there."""
+        after = np.roll(around, -1, axis=0)
         for turns in np.stack(np.meshgrid(*[[0, 1, -1] if c else [0] for c in self.closed]), axis=2).reshape(-1, 2):
-            if contains(around, uv + turns).mean() > 0.5:  # points on both loops may fall outside
+            if inside_loops(around, after, uv + turns).mean() > 0.5:  # points on both loops may fall outside
                 return uv + turns
         raise ValueError(f"loop {number}: lies outside the loop that encloses most")
 

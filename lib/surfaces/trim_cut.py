@@ -7,6 +7,7 @@ import numpy as np
 from lib.nurbs import lines as find_lines
 from lib.nurbs.cut import amended
 from lib.nurbs.evaluate import normal
+from lib.surfaces.loops import signed_area
 from lib.surfaces.trim_border import borders
 from lib.surfaces.trim_mesh import ROUNDS, Lines, Unfit, triangulate
 
@@ -30,8 +31,8 @@ class TrimmedPieces:
                 demands[s] = find_lines.with_lines(demands[s], d, along[d])
         self.plan = find_lines.plan(demands, find_lines.links(len(surfaces), np.empty((0, 5), dtype=int)))
         self.borders = borders(surfaces)
-        whole = [_shoelace(s.uv, s.loop_start) for s in surfaces]
-        self.share = np.clip(whole, 0.0, 1.0)
+        loops = [np.split(s.uv, s.loop_start[1:-1]) for s in surfaces]
+        self.share = np.clip([sum(map(signed_area, own)) for own in loops], 0.0, 1.0)
         self.holes = np.array([len(s.loop_start) - 2 for s in surfaces])
 
     def n_triangles(self, tolerance, slide):
@@ -130,11 +131,3 @@ class _Job:
                 break
             self.at_place = borders.lowered(self.at_place, unfit)
         return list(self.patches)
-
-
-def _shoelace(uv, loop_start):
-    area = 0.0
-    for a, b in zip(loop_start[:-1], loop_start[1:], strict=True):
-        x, y = uv[a:b].T
-        area += (x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
-    return area

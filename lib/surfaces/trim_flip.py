@@ -7,6 +7,7 @@ them too far off, the one is taken whose middle is nearer to the surface.
 import numpy as np
 
 from lib.nurbs.evaluate import evaluate
+from lib.surfaces.loops import double_area
 
 PASSES = 3
 BETTER = 0.9  # of the other's distance, to be taken
@@ -23,8 +24,9 @@ def flipped(base, S, uv, F, is_failing, fixed):
     for _ in range(PASSES):
         first, second, a, b, c, d = _pairs(F, is_failing, fixed, n)
         old, new = _off(base, S, uv, a, b), _off(base, S, uv, c, d)
-        whole = _area(uv, a, b, c) + _area(uv, b, a, d)
-        least = np.minimum(_area(uv, a, d, c), _area(uv, d, b, c))
+        A, B, C, D = (uv[corner] for corner in (a, b, c, d))
+        whole = double_area(A, B, C) + double_area(B, A, D)
+        least = np.minimum(double_area(A, D, C), double_area(D, B, C))
         good = np.flatnonzero((new < BETTER * old) & (least > CONVEX * whole))
         if not good.size:
             break
@@ -59,9 +61,3 @@ def _off(base, S, uv, a, b):
     """Distance of the surface from the middles of the edges a-b."""
     at = np.clip((uv[a] + uv[b]) / 2, 0.0, 1.0)
     return np.linalg.norm(evaluate(base, at[:, 0], at[:, 1])[0] - (S[a] + S[b]) / 2, axis=1)
-
-
-def _area(uv, a, b, c):
-    """Twice the area of triangles in (u, v)."""
-    x, y = uv[b] - uv[a], uv[c] - uv[a]
-    return x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0]

@@ -12,8 +12,9 @@ import pythoncdt
 
 from lib.nurbs.evaluate import evaluate
 from lib.nurbs.facets import Patch
-from lib.surfaces.loops import following, inside_loops
+from lib.surfaces.loops import corner_runs, double_area, following, inside_loops
 from lib.surfaces.pieces import pieces
+from lib.surfaces.rows import numbered
 from lib.surfaces.trim_distance import distances
 from lib.surfaces.trim_flat import without_flat
 from lib.surfaces.trim_flip import flipped
@@ -85,18 +86,9 @@ def _made(points, edges, crossing):
     return made
 
 
-def _distinct(points):
-    """(first (d,), number (k,)): the rows of points (k, 2) that are new, ascending, and which of them each equals."""
-    _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)
-    place = np.empty_like(order)
-    place[order] = np.arange(len(order))
-    return first[order], place[number.ravel()]
-
-
 def _inside(points, edges, more):
     """Triangles (m, 3) of `points` inside the loops of `edges`, with `more` edges; RuntimeError where edges cross."""
-    first, number = _distinct(points)
+    number, first = numbered(points)
     loops, more = number[edges], number[more]
     loops = loops[loops[:, 0] != loops[:, 1]]
     made = _made(points[first], np.concatenate([loops, more[more[:, 0] != more[:, 1]]]), NOT_ALLOWED)
@@ -117,7 +109,7 @@ def _in_loops(points, F, loops):
     is_open = ~np.isin(edge, key[uses % 2 == 1])[number]
     face = np.repeat(np.arange(len(F)), 3)[is_open]
     region = pieces(len(F) + len(edge), face, len(F) + number[is_open])[: len(F)]
-    area = _signed2(*(points[F[:, k]] for k in range(3)))
+    area = double_area(*(points[F[:, k]] for k in range(3)))
     order = np.argsort(-area, kind="stable")
     number, first = np.unique(region[order], return_index=True)
     largest = order[first]
@@ -128,7 +120,7 @@ def _in_loops(points, F, loops):
 
 def _crossed(points, edges):
     """Points and triangles inside loops that cross, the places of crossing added as points."""
-    first, number = _distinct(points)
+    number, first = numbered(points)
     loops = number[edges]
     made = _made(points[first], loops[loops[:, 0] != loops[:, 1]], TRY_RESOLVE)
     made.erase_outer_triangles_and_holes()
@@ -264,7 +256,7 @@ def _triangles(border, uv, edges, lines, grid, is_last):
             except RuntimeError:
                 continue
             F = np.concatenate([np.flatnonzero(rest)[F], cells + first])
-            area = _signed2(*(uv[F[:, k]] for k in range(3)))
+            area = double_area(*(uv[F[:, k]] for k in range(3)))
             if abs(area.sum() - expected) <= SAME_AREA * abs(expected) and area.min() >= -NOTHING * abs(expected):
                 return F, uv, np.concatenate([edges, more])
     if not is_last:
@@ -273,11 +265,6 @@ def _triangles(border, uv, edges, lines, grid, is_last):
         raise Unfit(_real(border, rows))
     points, F = _crossed(uv, edges)
     return F, np.concatenate([uv, points[len(uv) :]]), edges
-
-
-def _signed2(A, B, C):
-    """Twice the area of triangles in the plane."""
-    return (B[:, 0] - A[:, 0]) * (C[:, 1] - A[:, 1]) - (B[:, 1] - A[:, 1]) * (C[:, 0] - A[:, 0])
 
 
 def _real(border, rows):
@@ -291,16 +278,12 @@ def crossing(A, B):
     step = max(1, AT_ONCE // max(len(A), 1))
     for first in range(0, len(A), step):
         a, b = A[first : first + step, None], B[first : first + step, None]
-        sides = [np.sign(_turn(*three)) for three in ((a, b, A), (a, b, B), (A, B, a), (A, B, b))]
+        sides = [np.sign(double_area(*three)) for three in ((a, b, A), (a, b, B), (A, B, a), (A, B, b))]
         meets = (sides[0] * sides[1] <= 0) & (sides[2] * sides[3] <= 0) & ~((sides[0] == 0) & (sides[1] == 0))
         shares = [(x == y).all(axis=2) for x in (a, b) for y in (A, B)]
         i, j = np.nonzero(meets & ~np.logical_or.reduce(shares))
         out += [first + i, j]
     return np.unique(np.concatenate(out))
-
-
-def _turn(a, b, c):
-    return (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (b[..., 1] - a[..., 1]) * (c[..., 0] - a[..., 0])
 
 
 def _between(uv, F, on_edge):
@@ -341,16 +324,8 @@ def _patch(trim, keep, border, S, uv, F, found):
 
 def sides(trim, vertex):
     """Vertices along each run of the border from corner to corner, where `vertex` (k,) is -1 at points not kept."""
-    out = []
-    for a, b in zip(trim.loop_start[:-1], trim.loop_start[1:], strict=True):
-        corner = np.flatnonzero(np.isinf(trim.significance[a:b]))
-        corner = corner if corner.size else np.array([0])
-        loop = np.roll(vertex[a:b], -corner[0])
-        bounds = np.append(corner - corner[0], b - a)
-        loop = np.append(loop, loop[0])
-        runs = [loop[i : j + 1] for i, j in zip(bounds[:-1], bounds[1:], strict=True)]
-        out += [run[run >= 0] for run in runs]
-    return tuple(out)
+    runs = (vertex[run] for run in corner_runs(trim))
+    return tuple(run[run >= 0] for run in runs)
 
 
 def border_distance(trim, keep):

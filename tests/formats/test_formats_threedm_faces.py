@@ -9,8 +9,8 @@ import rhino3dm
 from lib.formats import threedm_faces
 from lib.nurbs.evaluate import frame, point
 from lib.nurbs.surface import NurbsSurface
+from lib.surfaces.loops import signed_area
 from lib.surfaces.measure import area, collapsed_sides
-from lib.surfaces.trim_build import signed_area
 from lib.surfaces.trimmed import TrimmedSurface
 from tests.formats.reading import read, refused
 
