@@ -19,6 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lib.radiosity.sparse_kernels import add_products
+
 BRIGHT = 0.1  # elements with this share of the largest unshot power shoot in the same round
 OVERSHOOT = 0.5  # c: halves the shots against 0; 1 is worse
 MOST_GAIN = 100.0  # bound of 1 / (1 - rho_avg)
@@ -93,8 +95,9 @@ class FormFactors:
         return np.sqrt(np.maximum(square - mean * mean, 0).max(axis=1, initial=0.0))
 
     def _sum(self, to, source, values):
-        weighted = self._F[:, None] * values[source]
-        return np.stack([np.bincount(to, w, minlength=self.n) for w in weighted.T], axis=1)
+        out = np.zeros(values.shape)
+        add_products(self._F, to, source, np.ascontiguousarray(values, dtype=np.float64), out)
+        return out
 
 
 def solve(H_direct, rho, area, F, residual=1e-3, bounces=None, first=None):

@@ -47,6 +47,15 @@ def exact(H_direct, rho, F):
     ]
 
 
+def test_products_are_those_of_the_dense_matrix():
+    entries, _ = random_rows(3)
+    F, whole = FormFactors(entries), dense(entries)
+    B = np.random.default_rng(4).random((12, 6))
+    assert F.gather(B) == pytest.approx(whole @ B, rel=EXACT)
+    assert F.scatter(B) == pytest.approx(whole.T @ B, rel=EXACT)
+    assert F.gather(B[:, ::2]) == pytest.approx(whole @ B[:, ::2], rel=EXACT)  # not in C order
+
+
 @pytest.mark.parametrize("rho, tolerance", [(0.5, 1e-3), (0.9, 2e-3), (0.99, 5e-3), (0.999, 0.02)])
 def test_closed_room(rho, tolerance):
     """H = H_direct / (1 - rho) everywhere; what convergence at 0.001 leaves."""
