@@ -7,29 +7,78 @@ r = 8 sqrt(A), and no subdivision into discs mends that nearby.  All lamps of a 
 so discs begin where it is small, and the kernel is summed over Gauss points between.
 """
 
+import math
+
 import numpy as np
 
+from lib.compiled import compiled, inlined
+
 NEAR, FAR = 8.0, 40.0  # polygons up to, discs from, in units of a facet's longer side: 0.02 % from there on
-GAUSS_SQUARE = np.array([(a, b) for a in (-1, 1) for b in (-1, 1)]) / np.sqrt(12) + 0.5  # degree 3
-GAUSS_TRIANGLE = np.array([(1, 1), (4, 1), (1, 4)]) / 6  # degree 2
+SQUARE = 1 / math.sqrt(12)  # Gauss points of the unit square lie this far from its middle: degree 3
 NO_EDGE = 1e-30  # |v_k x v_k+1| below this: the edge is a point or seen end-on
 
 
-def form_factor_disc(D, n, n_facet, area):
-    """F = A cos cos' / (pi r^2 + A) for facets at D = centre - x.
+@inlined
+def disc(dx, dy, dz, nx, ny, nz, fx, fy, fz, area):
+    """cos cos' / (pi r^2 + A) for a facet at (dx, dy, dz), 0 where either looks away; n, f unit normals of receiver
+    and facet."""
+    r2 = dx * dx + dy * dy + dz * dz
+    cos_x, cos_y = dx * nx + dy * ny + dz * nz, -(dx * fx + dy * fy + dz * fz)
+    if cos_x <= 0 or cos_y <= 0:
+        return 0.0
+    return cos_x * cos_y / max(r2 * (math.pi * r2 + area), NO_EDGE)
 
-    D (..., 3), n and n_facet broadcastable unit normals of receiver and facet, area (...): returns (...), 0 where
-    either looks away.
-    """
-    return area * _kernel(D, n, n_facet, area)
+
+@inlined
+def edge(ax, ay, az, bx, by, bz, nx, ny, nz):
+    """theta n . c / |c| of the edge from a to b, c = a x b."""
+    cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
+    length = math.sqrt(cx * cx + cy * cy + cz * cz)
+    if length <= NO_EDGE:
+        return 0.0
+    theta = math.atan2(length, ax * bx + ay * by + az * bz)
+    return theta * (cx * nx + cy * ny + cz * nz) / length
 
 
-def _kernel(D, n, n_facet, area):
-    r2 = np.einsum("...c,...c->...", D, D)
-    cos_x = np.einsum("...c,...c->...", D, n)
-    cos_y = -np.einsum("...c,...c->...", D, n_facet)
-    facing = (cos_x > 0) & (cos_y > 0)
-    return np.where(facing, cos_x * cos_y / np.maximum(r2 * (np.pi * r2 + area), NO_EDGE), 0.0)
+@inlined
+def polygon(vertices, i, x, y, z, nx, ny, nz):
+    """F of the polygon vertices[i] (k, 3) seen from (x, y, z) with normal n: every edge is cut at the horizon; one that
+    goes down leaves at `out`, one that comes up enters at `into`."""
+    k = vertices.shape[1]
+    total, is_cut = 0.0, False
+    out_x = out_y = out_z = into_x = into_y = into_z = 0.0
+    bx, by, bz = vertices[i, 0, 0] - x, vertices[i, 0, 1] - y, vertices[i, 0, 2] - z
+    height_b = bx * nx + by * ny + bz * nz
+    for following in range(1, k + 1):
+        j = following % k
+        ax, ay, az, height_a = bx, by, bz, height_b
+        bx, by, bz = vertices[i, j, 0] - x, vertices[i, j, 1] - y, vertices[i, j, 2] - z
+        height_b = bx * nx + by * ny + bz * nz
+        if height_a > 0 and height_b > 0:
+            total += edge(ax, ay, az, bx, by, bz, nx, ny, nz)
+            continue
+        is_cut = True
+        if height_a <= 0 and height_b <= 0:
+            continue
+        t = height_a / (height_a - height_b)
+        cx, cy, cz = ax + t * (bx - ax), ay + t * (by - ay), az + t * (bz - az)
+        if height_a > 0:
+            total += edge(ax, ay, az, cx, cy, cz, nx, ny, nz)
+            out_x, out_y, out_z = cx, cy, cz
+        else:
+            total += edge(cx, cy, cz, bx, by, bz, nx, ny, nz)
+            into_x, into_y, into_z = cx, cy, cz
+    if is_cut:
+        total += edge(out_x, out_y, out_z, into_x, into_y, into_z, nx, ny, nz)
+    return abs(total) / (2 * math.pi)
+
+
+@compiled("f8[:,:,:], f8[:,:], f8[:]")
+def polygons(vertices, n, F):
+    """F (m,) of one polygon each: vertices (m, k, 3) relative to the point, n (m, 3)."""
+    for i in range(len(F)):
+        F[i] = polygon(vertices, i, 0.0, 0.0, 0.0, n[i, 0], n[i, 1], n[i, 2])
+    return 0
 
 
 def form_factor_polygon(vertices, n):
@@ -40,44 +89,59 @@ def form_factor_polygon(vertices, n):
 
     F = 1 / (2 pi) |sum_k theta_k n . c_k / |c_k||, c_k = v_k x v_k+1, theta_k = atan2(|c_k|, v_k . v_k+1).
     """
-    height = np.einsum("mkc,mc->mk", vertices, n)
-    following = np.roll(vertices, -1, axis=1)
-    height_following = np.roll(height, -1, axis=1)
-    # Cut every edge at the horizon; an edge that goes down leaves at `out`, one that comes up enters at `into`.
-    above, above_following = height > 0, height_following > 0
-    with np.errstate(divide="ignore", invalid="ignore"):
-        t = np.where(above != above_following, height / (height - height_following), 0.0)
-    cut = vertices + t[..., None] * (following - vertices)
-    start = np.where(above[..., None], vertices, cut)
-    end = np.where(above_following[..., None], following, cut)
-    total = np.where(above | above_following, _edge(start, end, n[:, None]), 0.0).sum(axis=1)
-    out = np.where((above & ~above_following)[..., None], cut, 0.0).sum(axis=1)
-    into = np.where((~above & above_following)[..., None], cut, 0.0).sum(axis=1)
-    total = total + np.where(above.all(axis=1), 0.0, _edge(out, into, n))
-    return np.abs(total) / (2 * np.pi)
+    F = np.empty(len(vertices))
+    polygons(*(np.ascontiguousarray(a, dtype=np.float64) for a in (vertices, n)), F)
+    return F
 
 
-def _edge(a, b, n):
-    c = np.cross(a, b)
-    length = np.sqrt(np.einsum("...c,...c->...", c, c))
-    theta = np.arctan2(length, np.einsum("...c,...c->...", a, b))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        projected = theta * np.einsum("...c,...c->...", c, n) / length
-    return np.where(length > NO_EDGE, projected, 0.0)
+@inlined
+def gauss(dx, dy, dz, nx, ny, nz, normal, e1, e2, j, is_triangle):
+    """F / A of facet j, whose origin lies at (dx, dy, dz): the bare kernel at Gauss points of degree 3, on triangles
+    of degree 2."""
+    n_points = 3 if is_triangle else 4
+    total = 0.0
+    for p in range(n_points):
+        if is_triangle:
+            a, b = (4 if p == 1 else 1) / 6, (4 if p == 2 else 1) / 6
+        else:
+            a, b = 0.5 + (SQUARE if p >= 2 else -SQUARE), 0.5 + (SQUARE if p % 2 else -SQUARE)
+        x, y, z = (
+            dx + a * e1[j, 0] + b * e2[j, 0],
+            dy + a * e1[j, 1] + b * e2[j, 1],
+            dz + a * e1[j, 2] + b * e2[j, 2],
+        )
+        total += disc(x, y, z, nx, ny, nz, normal[j, 0], normal[j, 1], normal[j, 2], 0.0)
+    return total / n_points
 
 
-def form_factor_gauss(x, n, facets, column):
-    """F from points x, n (m, 3) to one facet each, column (m,): the bare kernel at Gauss points.  (m,)."""
-    F = np.zeros(len(x))
-    for points, rows in (
-        (GAUSS_SQUARE, np.flatnonzero(~facets.is_triangle[column])),
-        (GAUSS_TRIANGLE, np.flatnonzero(facets.is_triangle[column])),
-    ):
-        k = column[rows]
-        D, normal = facets.origin[k] - x[rows], facets.normal[k]
-        for a, b in points if len(rows) else ():
-            F[rows] += _kernel(D + a * facets.e1[k] + b * facets.e2[k], n[rows], normal, 0.0) / len(points)
-    return F * facets.area[column]
+@compiled(
+    "f8[:,:], f8[:,:], f8[:,:], f8[:,:], f8[:,:], f8[:,:], f8[:,:,:], f8[:,:], f8[:], b1[:], f8, f8[:,:]",
+)
+def facets_seen(x, n, centre, origin, e1, e2, corners, normal, area, is_triangle, reach, F):
+    """F (m, k) from m points to k facets (see form_factor_facets); reach, of the largest facet from its centre."""
+    for j in range(len(area)):
+        side = max(
+            e1[j, 0] * e1[j, 0] + e1[j, 1] * e1[j, 1] + e1[j, 2] * e1[j, 2],
+            e2[j, 0] * e2[j, 0] + e2[j, 1] * e2[j, 1] + e2[j, 2] * e2[j, 2],
+        )
+        fx, fy, fz = normal[j, 0], normal[j, 1], normal[j, 2]
+        for i in range(len(x)):
+            nx, ny, nz = n[i, 0], n[i, 1], n[i, 2]
+            dx, dy, dz = centre[j, 0] - x[i, 0], centre[j, 1] - x[i, 1], centre[j, 2] - x[i, 2]
+            F[i, j] = 0.0
+            if dx * fx + dy * fy + dz * fz >= 0:
+                continue
+            height, r2 = dx * nx + dy * ny + dz * nz, dx * dx + dy * dy + dz * dz
+            # What may reach below the horizon is cut there, as far off as it matters.
+            is_low = height * height < side
+            if height > -reach and r2 < side * (FAR * FAR if is_low else NEAR * NEAR):
+                F[i, j] = polygon(corners, j, x[i, 0], x[i, 1], x[i, 2], nx, ny, nz)
+            elif height > 0 and not is_low and r2 < FAR * FAR * side:
+                dx, dy, dz = origin[j, 0] - x[i, 0], origin[j, 1] - x[i, 1], origin[j, 2] - x[i, 2]
+                F[i, j] = area[j] * gauss(dx, dy, dz, nx, ny, nz, normal, e1, e2, j, is_triangle[j])
+            else:
+                F[i, j] = area[j] * disc(dx, dy, dz, nx, ny, nz, fx, fy, fz, area[j])
+    return 0
 
 
 def form_factor_facets(x, n, facets):
@@ -85,18 +149,9 @@ def form_factor_facets(x, n, facets):
 
     x, n (m, 3) points and unit normals; facets: Facets with k facets.  Returns (m, k) float64.
     """
-    D = facets.centre[None] - x[:, None]
-    F = form_factor_disc(D, n[:, None], facets.normal[None], facets.area[None])
-    ahead = np.einsum("mkc,kc->mk", D, facets.normal) < 0
-    side = np.maximum((facets.e1**2).sum(axis=1), (facets.e2**2).sum(axis=1))
-    r2 = np.einsum("mkc,mkc->mk", D, D)
-    # What may reach below the horizon is cut there, as far off as it matters.
-    height, corners = np.einsum("mkc,mc->mk", D, n), facets.corners()
-    cut = height**2 < side
-    reach = np.linalg.norm(corners - facets.centre[:, None], axis=2).max(axis=1, initial=0.0)
-    is_polygon = ahead & (r2 < np.where(cut, FAR, NEAR) ** 2 * side) & (height > -reach)  # some of it is above
-    row, column = np.nonzero(is_polygon)
-    F[row, column] = form_factor_polygon(corners[column] - x[row, None], n[row])
-    row, column = np.nonzero(ahead & ~is_polygon & ~cut & (r2 < FAR**2 * side) & (F > 0))
-    F[row, column] = form_factor_gauss(x[row], n[row], facets, column)
+    F, corners, centre = np.empty((len(x), len(facets.area))), facets.corners(), facets.centre
+    reach = np.linalg.norm(corners - centre[:, None], axis=2).max(initial=0.0)
+    arrays = x, n, centre, facets.origin, facets.e1, facets.e2, corners, facets.normal, facets.area
+    arrays = (np.ascontiguousarray(a, dtype=np.float64) for a in arrays)
+    facets_seen(*arrays, facets.is_triangle, reach, F)
     return F

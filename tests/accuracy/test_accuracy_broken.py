@@ -10,9 +10,10 @@ from benchmarks.hard_cases.bench import Bench
 from lib.elements import quadtree
 from lib.elements.lattice import Lattice
 from lib.maps import emission
-from lib.radiosity import form_factors, gather, rows, sampling, shooting
+from lib.radiosity import direct, gather, rows, sampling, shooting
 from lib.visibility import hemisphere, hidden
 from stages import shoot, tessellate
+from tests.radiosity import plain_form_factors
 
 
 def no_receiver_cosine(patch):
@@ -28,9 +29,14 @@ def no_receiver_cosine(patch):
 
 def no_emitter_cosine(patch):
     """Far facets shine the same in all directions."""
-    disc = form_factors.form_factor_disc
-    towards = lambda D, n, n_facet, area: disc(D, n, -D / np.linalg.norm(D, axis=-1, keepdims=True), area)  # noqa: E731
-    patch.setattr(form_factors, "form_factor_disc", towards)
+
+    def discs(x, n, facets):
+        D = facets.centre[None] - x[:, None]
+        r2 = (D * D).sum(axis=2)
+        cos = np.maximum(np.einsum("mkc,mc->mk", D, n), 0) / np.sqrt(r2)
+        return facets.area * cos / (np.pi * r2 + facets.area)
+
+    patch.setattr(direct, "form_factor_facets", discs)
 
 
 def no_lift(patch):
@@ -47,11 +53,13 @@ def no_lift(patch):
 def no_clipping(patch):
     """What is below the horizon counts as well."""
 
-    def whole(vertices, n):
-        total = form_factors._edge(vertices, np.roll(vertices, -1, axis=1), n[:, None]).sum(axis=1)
-        return np.abs(total) / (2 * np.pi)
+    def whole(x, n, facets):
+        corners = facets.corners()[None] - x[:, None, None]
+        edges = plain_form_factors._edge(corners, np.roll(corners, -1, axis=2), n[:, None, None])
+        is_ahead = np.einsum("mkc,kc->mk", corners[:, :, 0], facets.normal) < 0
+        return np.abs(edges.sum(axis=2)) / (2 * np.pi) * is_ahead
 
-    patch.setattr(form_factors, "form_factor_polygon", whole)
+    patch.setattr(direct, "form_factor_facets", whole)
 
 
 def nothing_hidden(patch):

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from lib.radiosity.emitters import Facets
-from lib.radiosity.form_factors import FAR, form_factor_disc, form_factor_facets, form_factor_polygon
+from lib.radiosity.form_factors import FAR, disc, form_factor_facets, form_factor_polygon
+from tests.radiosity import plain_form_factors
 from tests.tolerances import EXACT
 
 UP = np.array([[0.0, 0, 1]])
@@ -157,9 +158,9 @@ def around(facing, least, most, n=3000):
 def test_disc_is_the_polygon_from_afar(facing):
     """In any direction, grazing ones too."""
     D, flat = around(facing, FAR, 3 * FAR)
-    disc = form_factor_disc(D, UP, np.array([facing], float), 1.0)
+    F = np.array([disc(*d, *UP[0], *facing, 1.0) for d in D])
     exact = form_factor_polygon(D[:, None] + flat, np.repeat(UP, len(D), axis=0))
-    assert len(D) > 500 and np.abs(disc / exact - 1).max() < 1e-3
+    assert len(D) > 500 and np.abs(F / exact - 1).max() < 1e-3
 
 
 @pytest.mark.parametrize("is_triangle", [False, True])
@@ -179,10 +180,9 @@ def test_no_distance_is_less_exact(facing, is_triangle):
 
 def test_disc_on_its_axis():
     """A = pi, straight above at 1: 1 / 2."""
-    assert form_factor_disc(np.array([0, 0, 1.0]), UP[0], -UP[0], np.pi) == pytest.approx(0.5, rel=EXACT)
-    assert form_factor_disc(np.array([0, 0, 1.0]), UP[0], UP[0], np.pi) == 0
-    assert form_factor_disc(np.array([0, 0, -1.0]), UP[0], UP[0], np.pi) == 0
-    assert form_factor_disc(np.zeros(3), UP[0], -UP[0], np.pi) == 0
+    up, down = UP[0], -UP[0]
+    assert np.pi * disc(0, 0, 1.0, *up, *down, np.pi) == pytest.approx(0.5, rel=EXACT)
+    assert disc(0, 0, 1.0, *up, *up, np.pi) == disc(0, 0, -1.0, *up, *down, np.pi) == disc(0, 0, 0, *up, *down, 1) == 0
 
 
 @pytest.mark.parametrize("spacings", [0.01, 0.1, 0.5, 1, 2, 4])
@@ -209,3 +209,29 @@ def test_scale_changes_nothing():
     vertices = SQUARE * [1, 2, 0] + [0.3, -0.4, 1]
     for scale in (1e-6, 1e6):
         assert polygon(vertices * scale) == pytest.approx(polygon(vertices), rel=1e-10)
+
+
+@pytest.mark.parametrize("size", [0.003, 0.02, 0.1, 0.5])
+def test_points_and_facets_one_by_one_as_all_at_once(size):
+    """Parallelograms and triangles of all attitudes, at all distances, above, below and across the horizon."""
+    rng = np.random.default_rng(12)
+    k, m = 40, 500
+    origin, e1, across = rng.random((k, 3)), size * rng.normal(size=(k, 3)), rng.normal(size=(k, 3))
+    e2 = np.cross(across, e1) * rng.random((k, 1))
+    normal, area = np.cross(e1, e2), np.linalg.norm(np.cross(e1, e2), axis=1)
+    is_triangle = rng.random(k) < 0.5
+    facets = Facets(
+        origin, e1, e2, is_triangle, normal / area[:, None], area * np.where(is_triangle, 0.5, 1.0), np.ones(k)
+    )
+    x, n = rng.random((m, 3)), rng.normal(size=(m, 3))
+    n /= np.linalg.norm(n, axis=1)[:, None]
+    F = form_factor_facets(x, n, facets)
+    assert np.abs(F - plain_form_factors.form_factor_facets(x, n, facets)).max() < EXACT
+    assert (F > 0).mean() > 0.1
+
+
+def test_no_facets_and_no_points():
+    none = np.zeros((0, 3))
+    facets = Facets(none, none, none, np.zeros(0, dtype=bool), none, np.zeros(0), np.zeros(0))
+    assert form_factor_facets(UP, UP, facets).shape == (1, 0)
+    assert form_factor_facets(none, none, facets_of_grid(2, 1.0, 0.0)).shape == (0, 4)
