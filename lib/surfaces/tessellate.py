@@ -17,6 +17,7 @@ from lib.nurbs.surface import NurbsSurface
 from lib.surfaces import measure
 from lib.surfaces.mesh import Mesh
 from lib.surfaces.mesh_pieces import MeshPieces
+from lib.surfaces.pieces import pieces
 from lib.surfaces.trim_cut import TrimmedPieces
 from lib.surfaces.trimmed import TrimmedSurface
 
@@ -132,11 +133,11 @@ class Pieces:
 
     def __init__(self, surfaces, known, lattice=None, kinds=KINDS):
         self.surfaces, self.known, self.parts = surfaces, known, []
-        for kind, pieces in kinds.items():
+        for kind, made_by in kinds.items():
             index = np.flatnonzero([isinstance(s, kind) for s in surfaces])
             if index.size:
                 own = {int(np.searchsorted(index, s)): at for s, at in (lattice or {}).items() if s in index}
-                made = pieces([surfaces[s] for s in index], part(known, index), own)
+                made = made_by([surfaces[s] for s in index], part(known, index), own)
                 self.parts.append((index, made))
 
     def n_triangles(self, tolerance, slide):
@@ -221,18 +222,8 @@ def _weld(V, side, known, whole):
         if len(first) == len(second):
             a.append(first)
             b.append(second[::-1] if is_reversed else second)
-    same = np.arange(len(V))
-    if a:
-        a, b = np.concatenate(a), np.concatenate(b)
-        while True:  # the smallest number of all vertices in one place
-            low = np.minimum(same[a], same[b])
-            smallest = same.copy()
-            np.minimum.at(smallest, a, low)
-            np.minimum.at(smallest, b, low)
-            np.minimum.at(smallest, same[a], low)
-            np.minimum.at(smallest, same[b], low)
-            smallest = smallest[smallest]
-            if (smallest == same).all():
-                break
-            same = smallest
+    if not a:
+        return V, np.zeros(len(V))
+    piece = pieces(len(V), np.concatenate(a), np.concatenate(b))
+    same = np.unique(piece, return_index=True)[1][piece]  # the smallest number of all vertices in one place
     return V[same], np.linalg.norm(V[same] - V, axis=1)
