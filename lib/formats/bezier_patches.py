@@ -9,13 +9,12 @@ The formats state no normal.  Points are taken to run along u first, point k of 
 S_u x S_v points out of Newell's teapot.  Formats as in holmes3d.net/graphics/teapot and sjbaker.org's teaset.
 """
 
-import fnmatch
 import re
 
 import numpy as np
 
 from lib.formats import names
-from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch
+from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch, is_selected
 from lib.nurbs.surface import bezier
 
 MAX_DEGREE = 20
@@ -35,7 +34,7 @@ def read(text, report, only=None, teaset=False):
     patches = []
     for number, (line, P) in enumerate(nets, 1):
         labels = (str(number), names.padded(number, count))
-        if only is not None and not any(fnmatch.fnmatchcase(label, only) for label in labels):
+        if not is_selected(labels, only):
             continue
         surface = report.surface(lambda P=P: bezier(P.swapaxes(0, 1)), number, line)
         if surface is not None:

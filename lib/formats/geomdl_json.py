@@ -4,7 +4,6 @@
 control_points: {points, weights}}, ...]}}`; points are listed along v first and are not multiplied by the weights.
 """
 
-import fnmatch
 import json
 import math
 
@@ -12,7 +11,7 @@ import numpy as np
 
 from lib.formats import names
 from lib.formats.mistakes import nearest, shown
-from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch
+from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch, is_selected
 from lib.nurbs.surface import from_points
 
 MAX_DEGREE = 20
@@ -29,7 +28,7 @@ def read(text, report, only=None, trimmed="refuse"):
     for number, record in enumerate(records, 1):
         labels = _labels(record, number, len(records))
         labels_seen.append(labels[0])
-        if only is not None and not any(fnmatch.fnmatchcase(label, only) for label in labels):
+        if not is_selected(labels, only):
             continue
         if isinstance(record, dict) and record.get("trims"):
             if trimmed == "skip":

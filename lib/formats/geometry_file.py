@@ -12,7 +12,7 @@ from lib.refusal import refusal
 
 MAX_BYTES = 512 << 20
 MAX_TEXT = 48 << 20  # text takes some ten times its size in memory while it is read
-MAX_MESH_TEXT = 192 << 20  # an OBJ takes some twelve times its size
+MOST = {".bpt": MAX_TEXT, ".txt": MAX_TEXT, ".json": MAX_TEXT, ".obj": 192 << 20}  # an OBJ takes twelve times its size
 KINDS = {
     ".bpt": "Bezier patches", ".txt": "Bezier patches (teaset)", ".json": "geomdl JSON", ".3dm": "Rhino",
     ".obj": "Wavefront", ".glb": "glTF", ".gltf": "glTF",
@@ -71,13 +71,7 @@ def _read(path, file, name, only, trimmed, root):
     if kind not in KINDS:
         allowed = ", ".join(f"{suffix} ({what})" for suffix, what in KINDS.items())
         raise refusal(f"files of kind '{kind}' are not read; allowed: {allowed}", file, name, "file")
-    is_step = KINDS[kind] in ("STEP", "IGES")
-    most = (
-        MAX_BYTES
-        if is_step
-        else {".3dm": MAX_BYTES, ".glb": MAX_BYTES, ".gltf": MAX_BYTES, ".obj": MAX_MESH_TEXT}.get(kind, MAX_TEXT)
-    )
-    data = read_bytes(path, file, name, most)
+    data = read_bytes(path, file, name, MOST.get(kind, MAX_BYTES))
     report = Report(Mistakes(), file, name)
     if kind == ".3dm":
         from lib.formats import threedm
@@ -91,7 +85,7 @@ def _read(path, file, name, only, trimmed, root):
         from lib.formats import gltf_mesh
 
         content = gltf_mesh.read(data, report, only, path.parent)
-    elif is_step:
+    elif KINDS[kind] in ("STEP", "IGES"):
         from lib.formats import step
 
         content = step.read(path, data, report, only, trimmed)

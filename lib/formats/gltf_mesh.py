@@ -4,7 +4,6 @@ Nodes are placed as the file says, in its own axes: y is up, lengths are metres.
 bind pose.  Source: Khronos, glTF 2.0 specification, sections 3.5 and 3.7.
 """
 
-import fnmatch
 from collections import Counter
 from functools import partial
 
@@ -14,7 +13,7 @@ from lib.formats import names
 from lib.formats.gltf_buffers import Broken, Container, dicts, numbers
 from lib.formats.gltf_materials import Materials, table
 from lib.formats.mistakes import listed
-from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch
+from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch, is_selected
 from lib.surfaces.mesh import Flat, Mesh
 from lib.surfaces.mesh_build import Dropped, mesh
 
@@ -67,7 +66,7 @@ def _content(container, placed, skipped, report, only):
         name = None if material is None else materials.name(material)
         labels = tuple(dict.fromkeys([*labels, *([name] if name else []), str(number), names.padded(number, total)]))
         seen.update(dict.fromkeys(labels[:-1]))
-        if only is not None and not any(fnmatch.fnmatchcase(label, only) for label in labels):
+        if not is_selected(labels, only):
             continue
         made = report.surface(partial(shapes.placed, mesh_index, k, primitive, M), number)
         if made is None:

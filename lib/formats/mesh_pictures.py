@@ -4,6 +4,7 @@ import re
 from pathlib import Path, PurePosixPath
 
 from lib.formats.mistakes import listed
+from lib.formats.names import is_outside
 
 LFS = b"version https://git-lfs"  # how the text begins that stands for a file where Git LFS is not installed
 UNSEEN = 0.5  # reflectance of a material whose texture is not there, times the colour that multiplies the texture
@@ -43,11 +44,8 @@ class Pictures:
             return "no file name"
         if path.is_absolute() or re.match(r"[A-Za-z]:", name) or "://" in name:
             return "not a path beside the file"
-        depth = 0
-        for part in path.parts:
-            depth += -1 if part == ".." else 1
-            if depth < 0:
-                return "outside the file's folder"
+        if is_outside(path):
+            return "outside the file's folder"
         try:
             target = self.folder / path
             if not target.is_file():

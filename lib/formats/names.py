@@ -80,3 +80,28 @@ def numbered_stems(names):
     """
     width = max(3, len(str(len(names) - 1)))
     return [f"{index:0{width}d}-{cleaned(name)}" for index, name in enumerate(names)]
+
+
+def add(known, name, value):
+    """Put a value into a dict under a name, or `name (2)` and so on where that stands for another value: the key.
+
+    >>> known = {"oak": 1}
+    >>> add(known, "oak", 1), add(known, "oak", 2), add(known, "oak", 2), add(known, "oak", 3)
+    ('oak', 'oak (2)', 'oak (2)', 'oak (3)')
+    """
+    key, number = name, 1
+    while known.get(key, value) != value:
+        number += 1
+        key = f"{name} ({number})"
+    known[key] = value
+    return key
+
+
+def is_outside(path):
+    """Does a relative PurePosixPath lead out of the folder it starts in, if only on its way?"""
+    depth = 0
+    for part in path.parts:
+        depth += -1 if part == ".." else 1
+        if depth < 0:
+            return True
+    return False

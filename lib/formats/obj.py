@@ -4,7 +4,6 @@ Read are v, vt, vn, f (absolute and relative indices, any number of corners), us
 and lines are passed over, colours at vertices, curves and surfaces are noted.  The format states no unit and no axes.
 """
 
-import fnmatch
 from collections import Counter
 
 import numpy as np
@@ -13,7 +12,7 @@ from lib.formats import mtl, names
 from lib.formats.mesh_pictures import UNSEEN, Pictures
 from lib.formats.mistakes import listed
 from lib.formats.obj_lines import BadLine, Lines
-from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch
+from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch, is_selected
 from lib.surfaces.mesh_build import Dropped, mesh
 from lib.surfaces.polygons import triangles
 
@@ -115,9 +114,9 @@ def _patches(source, report, only):
         keep, name = order[start[k] : start[k + 1]], words.materials[k]
         own = (*([name] if name else []), str(number), names.padded(number, total))
         groups = np.unique(words.group[source.face[keep]])
-        if only is not None and not any(fnmatch.fnmatchcase(label, only) for label in own):
+        if not is_selected(own, only):
             labels_seen.update(dict.fromkeys([*own[:1], *(g for i in groups[:50] for g in words.groups[i])]))
-            matching = [i for i in groups if any(fnmatch.fnmatchcase(label, only) for label in words.groups[i])]
+            matching = [i for i in groups if is_selected(words.groups[i], only)]
             keep = keep[np.isin(words.group[source.face[keep]], matching)]
             groups = matching
             if not len(keep):

@@ -1,5 +1,6 @@
 """What every reader of geometry files returns, and where it notes its mistakes."""
 
+import fnmatch
 from dataclasses import dataclass, field
 
 from lib.formats import names
@@ -9,6 +10,11 @@ from lib.surfaces.mesh import Flat, Mesh
 from lib.surfaces.trimmed import TrimmedSurface
 
 MAX_PATCHES = 100_000
+
+
+def is_selected(labels, only):
+    """Does one of a surface's labels match the pattern `only`?  All are selected where that is None."""
+    return only is None or any(fnmatch.fnmatchcase(label, only) for label in labels)
 
 
 @dataclass(frozen=True)

@@ -281,23 +281,22 @@ def _write(path, extension, pixels, kind, attributes):
 
 def read_exr(path):
     """Read an EXR map: ((h, w, 3) float32 as stored, dict of its metadata). Raises Refusal as read_header does."""
-    source, spec = _open(path)
-    pixels = source.read_image("float")
-    fault = source.geterror()
-    source.close()
-    if pixels is None or fault:
-        raise Refusal(f"{path}: is cut off or damaged: {_first_line(fault)}")
-    pixels = pixels.reshape(spec.height, spec.width, spec.nchannels)
+    pixels, spec = _pixels(path, "float")
     metadata = {p.name: p.value for p in spec.extra_attribs}
     return np.ascontiguousarray(pixels[..., _colour_channels(spec)], np.float32), metadata
 
 
 def read_png8(path):
     """Read a picture's 8-bit codes as stored: (h, w, channels) uint8. Raises Refusal as read_header does."""
+    return _pixels(path, "uint8")[0]
+
+
+def _pixels(path, kind):
+    """((h, w, channels) numbers of a picture as `kind`, its ImageSpec)."""
     source, spec = _open(path)
-    pixels = source.read_image("uint8")
+    pixels = source.read_image(kind)
     fault = source.geterror()
     source.close()
     if pixels is None or fault:
         raise Refusal(f"{path}: is cut off or damaged: {_first_line(fault)}")
-    return pixels.reshape(spec.height, spec.width, spec.nchannels)
+    return pixels.reshape(spec.height, spec.width, spec.nchannels), spec

@@ -79,12 +79,7 @@ class _Brought:
                 if which in material:
                     material[which] = self._picture(material[which], folder, content)
             own = names.canonical(name) if names.complaint(name) is None else "material"
-            full, number = own, 1
-            while self.materials.get(full, material) != material:
-                number += 1
-                full = f"{own} ({number})"
-            self.materials[full] = material
-            names_of[name] = full
+            names_of[name] = names.add(self.materials, own, material)
         return names_of
 
     def _picture(self, written, folder, content):

@@ -116,11 +116,8 @@ def path_fault(folder, written):
     path = PurePosixPath(written)
     if path.is_absolute() or re.match(r"[A-Za-z]:[\\/]", written):
         return f"'{written}' is an absolute path; expected one relative to scene.yaml, inside its folder"
-    depth = 0
-    for part in path.parts:
-        depth += -1 if part == ".." else 1
-        if depth < 0:
-            return f"'{written}' lies outside the scene's folder"
+    if names.is_outside(path):
+        return f"'{written}' lies outside the scene's folder"
     try:
         target = Path(folder) / path
         if not target.exists():

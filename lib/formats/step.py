@@ -4,7 +4,6 @@ The converter (step_faces, which needs the extra `step`) may crash or hang on a 
 this process goes on.
 """
 
-import fnmatch
 import re
 import signal
 import subprocess
@@ -18,7 +17,7 @@ import numpy as np
 from lib.formats import names, step_result
 from lib.formats.artefact import ArtefactError
 from lib.formats.mistakes import listed
-from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch
+from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch, is_selected
 from lib.maps.colour import linear_to_srgb
 from lib.nurbs.shape import transformed
 from lib.surfaces.trim_build import EdgeUse, significance, trimmed
@@ -128,7 +127,7 @@ class _Patches:
             labels = (*place["labels"], *([colour] if colour else []))
             labels_seen |= dict.fromkeys(labels)
             labels = (*labels, str(number), names.padded(number, len(where)))
-            if self.only is not None and not any(fnmatch.fnmatchcase(label, self.only) for label in labels):
+            if not is_selected(labels, self.only):
                 continue
             if self.faces.is_trimmed[face] and self.trims != "keep":
                 if self.trims == "skip":

@@ -4,7 +4,6 @@ The one importer of rhino3dm.  Blocks are imported once for each reference to th
 SubDs and lights without an area are left out and counted.
 """
 
-import fnmatch
 from collections import Counter
 from dataclasses import dataclass
 
@@ -13,7 +12,7 @@ import rhino3dm
 
 from lib.formats import names, threedm_materials
 from lib.formats.mistakes import listed
-from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch
+from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch, is_selected
 from lib.formats.threedm_faces import Body, nurbs_surface
 from lib.formats.threedm_materials import Materials
 from lib.formats.threedm_objects import shown
@@ -103,7 +102,7 @@ def _patches(parts, materials, report, only, trimmed):
     patches, left_out = [], []
     for number, part in enumerate(parts, 1):
         labels = (*part.item.labels, str(number), names.padded(number, len(parts)))
-        if only is not None and not any(fnmatch.fnmatchcase(label, only) for label in labels):
+        if not is_selected(labels, only):
             continue
         if not part.is_whole and trimmed == "skip":
             left_out.append(number)

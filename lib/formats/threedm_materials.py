@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lib.formats import names
 from lib.formats.mesh_pictures import LFS, Pictures, pointer
 from lib.formats.mistakes import listed
 from lib.maps.colour import srgb_to_linear
@@ -50,12 +51,7 @@ class Materials:
 
     def add(self, name, material):
         """Put a material under `name`, or under one made from it if that stands for another material: its key."""
-        key, number = name, 1
-        while self.made.get(key, material) != material:
-            number += 1
-            key = f"{name} ({number})"
-        self.made[key] = material
-        return key
+        return names.add(self.made, name, material)
 
     def notes(self):
         """Sentences about textures that are not there and materials that are taken for others."""
