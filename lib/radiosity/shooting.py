@@ -68,7 +68,7 @@ class FormFactors:
         self._met = target = entries[row, column].astype(np.int64)
         pair, which = np.unique(row * np.int64(n) + target, return_inverse=True)
         self._row, self._column = pair // max(n, 1), pair % max(n, 1)
-        self._F = np.bincount(which.ravel(), weight[row, column], len(pair))
+        self._F = np.bincount(which.ravel(), weight[row, column], len(pair)).astype(float)  # bincount of none is int
         self.escaped = np.where(entries == -1, weight, 0.0).sum(axis=1)
         self.absorbed = np.where(entries == -2, weight, 0.0).sum(axis=1)
         self.met = 1 - self.escaped - self.absorbed
