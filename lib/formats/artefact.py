@@ -91,6 +91,16 @@ def read(path, kind, version):
     return header, arrays
 
 
+def check_arrays(path, x, expected):
+    """Raise ArtefactError if fields of x are not the arrays of `expected`, {name: (shape, dtype)}, or not finite."""
+    for name, (shape, dtype) in expected.items():
+        array = getattr(x, name)
+        if array.shape != shape or array.dtype != dtype:
+            raise ArtefactError(f"{path}: {name}: {array.shape} {array.dtype}, expected {shape} {np.dtype(dtype).name}")
+        if array.dtype.kind == "f" and not np.isfinite(array).all():
+            raise ArtefactError(f"{path}: {name}: NaN or Inf, expected finite numbers")
+
+
 def write_json(path, value):
     """Write a JSON file atomically, keys sorted, NaN refused."""
     with atomic(path) as file:

@@ -64,14 +64,7 @@ def _expected(x):
 
 def check(x, path="casters"):
     """Raise ArtefactError naming path and field of what breaks the class's promises."""
-    for name, (shape, dtype) in _expected(x).items():
-        array = getattr(x, name)
-        if array.shape != shape or array.dtype != dtype:
-            raise artefact.ArtefactError(
-                f"{path}: {name}: {array.shape} {array.dtype}, expected {shape} {np.dtype(dtype).name}"
-            )
-        if array.dtype == np.float64 and not np.isfinite(array).all():
-            raise artefact.ArtefactError(f"{path}: {name}: NaN or Inf, expected finite numbers")
+    artefact.check_arrays(path, x, _expected(x))
     n = len(x.area)
     rules = {
         "scale": x.scale > 0,

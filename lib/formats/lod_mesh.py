@@ -59,14 +59,7 @@ def _expected(x):
 
 def check(x, path="lod_mesh"):
     """Raise ArtefactError naming path and field of what breaks the class's promises."""
-    for name, (shape, dtype) in _expected(x).items():
-        array = getattr(x, name)
-        if array.shape != shape or array.dtype != dtype:
-            raise artefact.ArtefactError(
-                f"{path}: {name}: {array.shape} {array.dtype}, expected {shape} {np.dtype(dtype).name}"
-            )
-        if array.dtype.kind == "f" and not np.isfinite(array).all():
-            raise artefact.ArtefactError(f"{path}: {name}: NaN or Inf, expected finite numbers")
+    artefact.check_arrays(path, x, _expected(x))
     rules = {
         "UV": (x.UV >= 0).all() and (x.UV <= 1).all(),
         "N": np.allclose(np.linalg.norm(x.N, axis=1), 1, atol=1e-5),

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -161,3 +162,19 @@ def test_files_get_the_rights_of_ordinary_files(tmp_path):
     finally:
         os.umask(mask)
     assert path.stat().st_mode & 0o777 == 0o640
+
+
+@pytest.mark.parametrize(
+    "field, value, said",
+    [
+        ("V", np.zeros((3, 2)), r"x.npz: V: \(3, 2\) float64, expected \(3, 3\) float64"),
+        ("F", np.zeros((1, 3)), r"x.npz: F: \(1, 3\) float64, expected \(1, 3\) int32"),
+        ("V", np.full((3, 3), np.nan), "x.npz: V: NaN or Inf"),
+    ],
+)
+def test_arrays_that_are_not_what_is_expected_are_named(field, value, said):
+    expected = {"V": ((3, 3), np.float64), "F": ((1, 3), np.int32)}
+    sound = {"V": np.zeros((3, 3)), "F": np.zeros((1, 3), np.int32)}
+    artefact.check_arrays("x.npz", SimpleNamespace(**sound), expected)
+    with pytest.raises(ArtefactError, match=said):
+        artefact.check_arrays("x.npz", SimpleNamespace(**sound | {field: value}), expected)
