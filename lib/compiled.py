@@ -55,6 +55,8 @@ class Kernel:
         for code, axes in self.types:
             argtypes += [ctypes.c_void_p, *[ctypes.c_int64] * axes] if axes else [NUMBERS[code]]
         address = _engine(self.__module__).get_function_address(self.__name__)
+        if not address:
+            raise AttributeError(f"{self.__name__} is no kernel of {self.__module__} any more")
         return ctypes.CFUNCTYPE(ctypes.c_int64, *argtypes)(address)
 
 

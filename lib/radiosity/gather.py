@@ -73,27 +73,20 @@ class LookupTable:
 
     def __init__(self, maps, mesh, n_surfaces, channels):
         """maps : {surface: RadiosityMap}; surfaces without one reflect nothing."""
-        width, height = np.full(n_surfaces, 2), np.full(n_surfaces, 2)
-        offset = np.zeros(n_surfaces + 1, dtype=np.int64)  # texel 0..3: a map of nothing
-        nothing = np.zeros((4, channels + 1), dtype=np.float32)
-        nothing[:, -1] = 1.0
+        places = np.tile([0, 2, 2], (n_surfaces, 1))  # texels 0 to 3: a map of nothing
+        nothing = np.zeros((4, channels // 3 * 4), dtype=np.float32)
         total, blocks, direct = 4, [nothing], [nothing]
-        rho, near = np.zeros((n_surfaces + 1, channels), dtype=np.float32), np.zeros(n_surfaces + 1, dtype=np.float32)
+        rho, near = np.zeros((n_surfaces, channels), dtype=np.float32), np.zeros(n_surfaces, dtype=np.float32)
         for s, m in sorted(maps.items()):
             h, w = m.weight.shape
-            width[s], height[s], offset[s] = w, h, total
+            places[s] = total, w, h
             blocks.append(_weighted(m.value, m.weight))
             direct.append(_weighted(m.direct, m.weight))
             rho[s], near[s] = m.rho, NEAR * m.width
             total += h * w
         self._all, self._direct = np.concatenate(blocks), np.concatenate(direct)
-        surface = np.append(mesh.face_surface, n_surfaces)
-        faces = mesh.texel_coordinates(width, height)
-        width, height = np.append(width, 2), np.append(height, 2)
-        last = np.stack([width[surface] - 2, height[surface] - 2], axis=1)
-        self._faces = np.concatenate([faces, last.astype(np.float32)], axis=1)
-        self._places = self._faces, offset[surface], width[surface]
-        self._rho, self._near, self.normal = rho[surface], near[surface], mesh.normal
+        self._places = mesh.texel_coordinates(places[:, 1], places[:, 2]), mesh.face_surface, places
+        self._rho, self._near, self.normal = rho, near, mesh.normal
 
     def see(self, hits, follows):
         """Radiosity seen by each ray, (n, C) float32, 0 for misses and back faces; and which rays (m,) hit fronts
@@ -111,7 +104,12 @@ class LookupTable:
 
 
 def _weighted(value, weight):
-    return np.concatenate([value * weight[..., None], weight[..., None]], axis=2).reshape(weight.size, -1)
+    """Texels of a map (h, w, 3 G) and its weight (h, w): (h w, 4 G), for each group weight times value, and weight."""
+    h, w, channels = value.shape
+    texels = np.empty((h, w, channels // 3, 4), dtype=np.float32)
+    texels[..., :3] = value.reshape(h, w, -1, 3) * weight[..., None, None]
+    texels[..., 3] = weight[..., None]
+    return texels.reshape(h * w, -1)
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,9 @@
 """Compiled loops of the final gather: what rays see in the radiosity maps, and the rays that follow near hits.
 
-Arrays of rays hold those of a sample together.  `faces` (f, 8) are rows s, t, ds_a, dt_a, ds_b, dt_b, last_i, last_j in
-texels of the map of each face's surface; `corner` (f,) its first texel, `width` (f,) texels of its rows; texels
-(total, C + 1) hold weight times radiosity, and the weight.  Every kernel writes into arrays it is given.
+Arrays of rays hold those of a sample together.  `faces` (f, 6) are rows s, t, ds_a, dt_a, ds_b, dt_b in texels of the
+map of each face's surface; `surface` (f,) that surface; `places` (surfaces, 3) the first texel of its map, the texels
+of a row, and the rows; `texels` (total, 4 G) hold for each light group weight times radiosity, and the weight.  Every
+kernel writes into arrays it is given.
 """
 
 import numpy as np
@@ -16,46 +17,52 @@ CLOSEST = np.float32(1e-6)
 
 
 @inlined
-def look_up(faces, corner, width, texels, face, a, b, out, row):
+def mixed(texels, first, above, c, f, g):
+    """Bilinear mean of column c of texels first, first + 1, above, above + 1."""
+    low = texels[first, c] + f * (texels[first + 1, c] - texels[first, c])
+    high = texels[above, c] + f * (texels[above + 1, c] - texels[above, c])
+    return low + g * (high - low)
+
+
+@inlined
+def look_up(faces, surface, places, texels, face, a, b, out, row):
     """Put the mean radiosity of the four texels round a hit, by bilinear weights, into out[row, :]."""
     s = faces[face, 0] + a * faces[face, 2] + b * faces[face, 4]
     t = faces[face, 1] + a * faces[face, 3] + b * faces[face, 5]
-    i = min(max(np.floor(s), NONE), faces[face, 6])
-    j = min(max(np.floor(t), NONE), faces[face, 7])
-    f, g = s - i, t - j
-    first = corner[face] + np.int64(j) * width[face] + np.int64(i)
-    above = first + width[face]
-    last = texels.shape[1] - 1
-    weight = NONE
-    for back in range(last + 1):
-        c = last - back  # the weight is the last column, and comes first
-        low = texels[first, c] + f * (texels[first + 1, c] - texels[first, c])
-        high = texels[above, c] + f * (texels[above + 1, c] - texels[above, c])
-        value = low + g * (high - low)
-        if back == 0:
-            weight = ONE / value if value > NONE else ONE
-        else:
-            out[row, c] = value * weight
+    map_of = surface[face]
+    width = places[map_of, 1]
+    i = min(max(np.int64(s), 0), width - 2)
+    j = min(max(np.int64(t), 0), places[map_of, 2] - 2)
+    f, g = s - np.float32(i), t - np.float32(j)
+    first = places[map_of, 0] + j * width + i
+    above = first + width
+    for c in range(0, texels.shape[1], 4):  # four columns side by side are one vector of the machine
+        x, y = mixed(texels, first, above, c, f, g), mixed(texels, first, above, c + 1, f, g)
+        z, weight = mixed(texels, first, above, c + 2, f, g), mixed(texels, first, above, c + 3, f, g)
+        scale = ONE / weight if weight > NONE else ONE
+        channel = c // 4 * 3
+        out[row, channel], out[row, channel + 1], out[row, channel + 2] = x * scale, y * scale, z * scale
 
 
 @compiled(
-    "f4[:,:], i8[:], i8[:], f4[:,:], f4[:], i4[:], f4[:], f4[:], f4[:], b1[:], i8, f4[:,:], i8[:]",
+    "f4[:,:], i8[:], i8[:,:], f4[:,:], f4[:], i4[:], f4[:], f4[:], f4[:], b1[:], i8, f4[:,:], i8[:]",
 )
-def see(faces, corner, width, texels, near, face, a, b, t, is_back, follows, seen, chosen):
-    """Radiosity seen (n, C) by rays, 0 for misses and back faces.
+def see(faces, surface, places, texels, near, face, a, b, t, is_back, follows, seen, chosen):
+    """Radiosity seen (n, 3 G) by rays, 0 for misses and back faces.
 
-    near (f,) : front hits nearer than that are not looked up but listed in chosen (n,), if follows; returns how many.
+    near (surfaces,) : front hits nearer than that are not looked up but listed in chosen (n,), if follows; returns how
+    many.
     """
     n_chosen = 0
     for r in range(len(face)):
         if face[r] < 0 or is_back[r]:
             for c in range(seen.shape[1]):
                 seen[r, c] = NONE
-        elif follows and t[r] < near[face[r]]:
+        elif follows and t[r] < near[surface[face[r]]]:
             chosen[n_chosen] = r
             n_chosen += 1
         else:
-            look_up(faces, corner, width, texels, face[r], a[r], b[r], seen, r)
+            look_up(faces, surface, places, texels, face[r], a[r], b[r], seen, r)
     return n_chosen
 
 
@@ -85,14 +92,15 @@ def onward(chosen, face, t, normal, origins, D, ray, K, shift, step, turn, origi
     return 0
 
 
-@compiled("f4[:,:], i8[:], i8[:], f4[:,:], f4[:,:], i8[:], i4[:], f4[:], f4[:], f4[:,:], f4[:,:]")
-def reflect(faces, corner, width, direct, rho, chosen, face, a, b, H, seen):
-    """Radiosity seen by the chosen rays: direct light by its maps, and rho (f, C) times the irradiance H (m, C)."""
+@compiled("f4[:,:], i8[:], i8[:,:], f4[:,:], f4[:,:], i8[:], i4[:], f4[:], f4[:], f4[:,:], f4[:,:]")
+def reflect(faces, surface, places, direct, rho, chosen, face, a, b, H, seen):
+    """Radiosity seen by the chosen rays: direct light by its maps, and rho (surfaces, 3 G) times the irradiance H
+    (m, 3 G)."""
     for m in range(len(chosen)):
         r = chosen[m]
-        look_up(faces, corner, width, direct, face[r], a[r], b[r], seen, r)
+        look_up(faces, surface, places, direct, face[r], a[r], b[r], seen, r)
         for c in range(seen.shape[1]):
-            seen[r, c] += rho[face[r], c] * H[m, c]
+            seen[r, c] += rho[surface[face[r]], c] * H[m, c]
     return 0
 
 

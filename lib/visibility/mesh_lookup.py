@@ -41,12 +41,9 @@ class MeshLookup:
         return element, point
 
     def texel_coordinates(self, width, height):
-        """Faces in texel units of their surface's map: (m + 1, 6) float32 rows s, t, ds_a, dt_a, ds_b, dt_b; the last
-        is zero.
+        """Faces in texel units of their surface's map: (m, 6) float32 rows s, t, ds_a, dt_a, ds_b, dt_b.
 
         width, height (n,) texels of each surface's map.
         """
         scale = np.stack([width - 1, height - 1], axis=1)[self.face_surface]
-        table = np.zeros((len(self.face_surface) + 1, 6), dtype=np.float32)
-        table[:-1] = (self._uv * scale[:, None]).reshape(-1, 6)
-        return table
+        return (self._uv * scale[:, None]).reshape(-1, 6).astype(np.float32)

@@ -5,6 +5,7 @@ of SplitMix64 (Steele, Lea, Flood 2014).
 """
 
 import hashlib
+from functools import cache
 
 import numpy as np
 
@@ -35,6 +36,7 @@ def fibonacci(n):
     return np.stack([k / n, (k * GOLDEN) % 1.0], axis=1)
 
 
+@cache
 def path_steps(number):
     """Step (2,) and turn (2, 2) of the coordinates of step `number` = 1, 2, ... of path k beyond its first direction:
 
