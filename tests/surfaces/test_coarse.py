@@ -6,6 +6,7 @@ import pytest
 from lib.surfaces.coarse import coarse
 from lib.surfaces.trimmed import TrimmedSurface
 from tests.shapes import rectangle, sphere
+from tests.surfaces.trimmed_shapes import octant
 
 
 def areas(surface):
@@ -31,3 +32,8 @@ def test_a_disc_cut_out_of_a_square():
     trim = TrimmedSurface(base, np.array([0.0, 1, 0, 1]), uv, np.array([0, 4, 204]), S, sizes)
     decagon = 10 / 2 * 0.5**2 * np.sin(2 * np.pi / 10)
     assert areas(trim).sum(axis=0) == pytest.approx([0, 0, 4 - decagon])
+
+
+def test_the_inside_of_a_curved_trimmed_surface_bulges():
+    """An octant of the unit sphere: its area is pi / 2, that of the flat triangle between its corners 0.87."""
+    assert np.linalg.norm(areas(octant()), axis=1).sum() == pytest.approx(np.pi / 2, rel=0.05)

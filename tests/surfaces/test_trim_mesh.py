@@ -268,6 +268,8 @@ def test_flat_triangles_are_flipped_not_left_out():
     F = without_flat(S, np.array([[0, 1, 2], [0, 2, 3], [2, 4, 3]]), around)
     turned = {tuple(np.roll(t, -np.argmin(t))) for t in F.tolist()}
     assert turned == {(0, 1, 3), (1, 2, 3)}  # and the triangle of a pole, 2 and 4 in one place, is gone
+    kept = without_flat(S, np.array([[0, 1, 2], [0, 2, 3]]), np.array([[0, 2]]))
+    assert kept.tolist() == [[0, 1, 2], [0, 2, 3]]  # the long edge has to stay
 
 
 @pytest.mark.parametrize("asked", [2000, 300, 90])
