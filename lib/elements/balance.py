@@ -36,14 +36,14 @@ def grow(cells, closed=(False, False)):
 
 
 def _grow_along(cells, axis, closed):
-    before, after = np.roll(cells, 1, axis=axis), np.roll(cells, -1, axis=axis)
-    if not closed:
-        index = [slice(None), slice(None)]
-        index[axis] = 0
-        before[tuple(index)] = False
-        index[axis] = -1
-        after[tuple(index)] = False
-    return cells | before | after
+    grown = cells.copy()
+    source, target = np.moveaxis(cells, axis, 0), np.moveaxis(grown, axis, 0)
+    target[1:] |= source[:-1]
+    target[:-1] |= source[1:]
+    if closed:
+        target[0] |= source[-1]
+        target[-1] |= source[0]
+    return grown
 
 
 def is_balanced(divided, closed=(False, False)):

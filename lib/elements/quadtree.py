@@ -12,6 +12,7 @@ like any other.
 import numpy as np
 
 from lib.elements.balance import balance, children, grow
+from lib.elements.tree_kernels import contrasts, mark_crossings, residuals
 
 CONTACT_CELL = 1 / 200  # of the scene's largest side: cells along a contact are divided down to this
 WIDE, WIDE_LEVELS = 1.0, 2  # root-cell widths; levels below the base
@@ -151,44 +152,19 @@ class Quadtree:
         least = np.minimum.reduce([reach[:-1, :-1], reach[:-1, 1:], reach[1:, :-1], reach[1:, 1:]])
         return self.side * 2.0**-level > WIDE * least
 
-    def _light(self, step):
-        """Light that decides, at every step-th crossing: the sum over light groups (h, w, 3)."""
-        value = self.value[::step, ::step]
-        return value if value.shape[2] <= 3 else value.reshape(*value.shape[:2], -1, 3).sum(axis=2)
-
     def contrast(self, level):
         """Largest difference between visible corners of each cell of a level, over channels: (rows, columns)."""
-        step = 2 ** (self.level - level)
-        value, hidden = self._light(step), self.hidden[::step, ::step]
-        low = np.where(hidden[..., None], np.inf, value)
-        high = np.where(hidden[..., None], -np.inf, value)
-        corners = [(slice(None, -1), slice(None, -1)), (slice(None, -1), slice(1, None))]
-        corners += [(slice(1, None), slice(None, -1)), (slice(1, None), slice(1, None))]
-        spread = np.maximum.reduce([high[c] for c in corners]) - np.minimum.reduce([low[c] for c in corners])
-        return np.where(np.isfinite(spread), spread, 0.0).max(axis=2)
+        out = np.empty(self.lattice.cells(level), dtype=np.float32)
+        contrasts(self.value, self.hidden, 2 ** (self.level - level), out)
+        return out
 
     def residual(self, level):
         """Largest departure of the five midpoints from bilinear prediction, for each divided cell of a level: (rows,
         columns).
         """
-        step = 2 ** (self.level - level - 1)
-        value, hidden = self._light(step), self.hidden[::step, ::step]
-        row = _departure(value[::2, ::2], hidden[::2, ::2], value[::2, 1::2], hidden[::2, 1::2], axis=1)
-        column = _departure(value[::2, ::2], hidden[::2, ::2], value[1::2, ::2], hidden[1::2, ::2], axis=0)
-        ends, ends_hidden = value[::2, ::2], hidden[::2, ::2]
-        across = (ends[:, :-1] + ends[:, 1:]) / 2
-        across_hidden = ends_hidden[:, :-1] | ends_hidden[:, 1:]
-        centre = _departure(across, across_hidden, value[1::2, 1::2], hidden[1::2, 1::2], axis=0)
-        worst = np.maximum.reduce([row[:-1], row[1:], column[:, :-1], column[:, 1:], centre])
-        # A departure within the samples' own noise says nothing.
-        noise = self.noise[::step, ::step]
-        doubt = np.maximum.reduce(
-            [
-                noise[a : a + 2 * len(worst) : 2, b : b + 2 * worst.shape[1] : 2]
-                for a, b in ((0, 1), (2, 1), (1, 0), (1, 2), (1, 1))
-            ]
-        )
-        return np.where(self.divided[level], np.maximum(worst - NOISE * doubt, 0.0), 0.0)
+        out = np.empty(self.lattice.cells(level), dtype=np.float32)
+        residuals(self.value, self.hidden, self.noise, self.divided[level], 2 ** (self.level - level), NOISE, out)
+        return out
 
     def _deepen(self):
         self.level += 1
@@ -202,11 +178,7 @@ class Quadtree:
     def _want(self, fresh):
         required = np.zeros_like(self.known)
         for level, cells in enumerate(fresh):
-            step = 2 ** (self.level - level - 1)
-            j, i = np.nonzero(cells)
-            for dj in range(3):
-                for di in range(3):
-                    required[(2 * j + dj) * step, (2 * i + di) * step] = True
+            mark_crossings(np.ascontiguousarray(cells), 2 ** (self.level - level - 1), required)
         self._wanted = required & ~self.known
         # A copy across the seam asks for the sample it repeats.
         if self.lattice.closed[0]:
@@ -239,12 +211,3 @@ class Quadtree:
             j, i = np.nonzero(self.is_leaf(level))
             rows.append(np.stack([np.full(j.size, level), j, i], axis=1))
         return np.concatenate(rows).astype(np.int32)
-
-
-def _departure(ends, ends_hidden, middle, middle_hidden, axis):
-    """|middle - mean of its two ends|, largest over channels; 0 where one of the three is hidden."""
-    n = ends.shape[axis]
-    first, last = np.arange(n - 1), np.arange(1, n)
-    predicted = (np.take(ends, first, axis=axis) + np.take(ends, last, axis=axis)) / 2
-    skip = np.take(ends_hidden, first, axis=axis) | np.take(ends_hidden, last, axis=axis) | middle_hidden
-    return np.where(skip, 0.0, np.abs(middle - predicted).max(axis=-1))

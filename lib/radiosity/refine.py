@@ -104,7 +104,7 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, 
             np.zeros(n, np.float32),
         )
         rays = rays_for(points.cell, contrast_at(points, solution), K[points.surface])
-        for k in np.unique(rays):
+        for k in np.flatnonzero(np.bincount(rays)):  # np.unique loads numpy.ma, 0.06 s
             of = np.flatnonzero(rays == k)
             light = indirect_light(
                 points.x[of], points.N[of], points.shift[of], int(k), world.tracer, world.mesh, table, world.channels

@@ -1,0 +1,102 @@
+"""Compiled loops over the cells of one level of a quadtree (see lib.elements.quadtree).
+
+value (h, w, C) float32, hidden (h, w) bool lie on the tree's whole lattice, of which a level's crossings are every
+step-th.  Light is the sum of all groups of three channels.  Every kernel writes into the arrays it is given last.
+"""
+
+import numpy as np
+
+from lib.compiled import compiled, inlined
+
+NONE, HALF, LARGEST = np.float32(0), np.float32(0.5), np.float32(np.inf)
+
+
+@inlined
+def light(value, j, i, channel):
+    """One channel of the light at a crossing."""
+    total = value[j, i, channel]
+    for c in range(channel + 3, value.shape[2], 3):
+        total += value[j, i, c]
+    return total
+
+
+@inlined
+def departure(value, hidden, j, i, dj, di):
+    """|light - mean of the lights at (j - dj, i - di) and (j + dj, i + di)|, the largest channel; 0 where one of the
+    three is hidden."""
+    if hidden[j, i] or hidden[j - dj, i - di] or hidden[j + dj, i + di]:
+        return NONE
+    most = NONE
+    for c in range(min(value.shape[2], 3)):
+        mean = (light(value, j - dj, i - di, c) + light(value, j + dj, i + di, c)) * HALF
+        most = max(most, abs(light(value, j, i, c) - mean))
+    return most
+
+
+@inlined
+def departure_of_centre(value, hidden, j, i, half):
+    """The same for the middle of a cell against the mean of its corners."""
+    a, b, left, right = j - half, j + half, i - half, i + half
+    if hidden[j, i] or hidden[a, left] or hidden[a, right] or hidden[b, left] or hidden[b, right]:
+        return NONE
+    most = NONE
+    for c in range(min(value.shape[2], 3)):
+        low = (light(value, a, left, c) + light(value, a, right, c)) * HALF
+        high = (light(value, b, left, c) + light(value, b, right, c)) * HALF
+        most = max(most, abs(light(value, j, i, c) - (low + high) * HALF))
+    return most
+
+
+@compiled("f4[:,:,:], b1[:,:], f4[:,:], b1[:,:], i8, f4, f4[:,:]")
+def residuals(value, hidden, noise, divided, step, errors, residual):
+    """Largest departure of the five midpoints of each divided cell, less `errors` times their largest noise (h, w), at
+    least 0; 0 for others: residual (rows, columns)."""
+    half = step // 2
+    rows, columns = divided.shape
+    for row in range(rows):
+        for column in range(columns):
+            residual[row, column] = NONE
+            if not divided[row, column]:
+                continue
+            j, i = row * step + half, column * step + half
+            worst = departure_of_centre(value, hidden, j, i, half)
+            worst = max(worst, departure(value, hidden, j - half, i, 0, half))
+            worst = max(worst, departure(value, hidden, j + half, i, 0, half))
+            worst = max(worst, departure(value, hidden, j, i - half, half, 0))
+            worst = max(worst, departure(value, hidden, j, i + half, half, 0))
+            # A departure within the samples' own noise says nothing.
+            doubt = max(noise[j - half, i], noise[j + half, i], noise[j, i - half], noise[j, i + half], noise[j, i])
+            residual[row, column] = max(worst - errors * doubt, NONE)
+    return 0
+
+
+@compiled("f4[:,:,:], b1[:,:], i8, f4[:,:]")
+def contrasts(value, hidden, step, contrast):
+    """Largest difference between visible corners of each cell, over channels: contrast (rows, columns)."""
+    rows, columns = contrast.shape
+    for row in range(rows):
+        for column in range(columns):
+            contrast[row, column] = NONE
+            for c in range(min(value.shape[2], 3)):
+                low, high = LARGEST, -LARGEST
+                for corner in range(4):
+                    j, i = (row + corner // 2) * step, (column + corner % 2) * step
+                    if not hidden[j, i]:
+                        here = light(value, j, i, c)
+                        low, high = min(low, here), max(high, here)
+                contrast[row, column] = max(contrast[row, column], high - low if high >= low else NONE)
+    return 0
+
+
+@compiled("b1[:,:], i8, b1[:,:]")
+def mark_crossings(cells, step, crossings):
+    """Mark the nine crossings of each of the cells (rows, columns): corners and midpoints, on a lattice (h, w) of which
+    they are every step-th."""
+    rows, columns = cells.shape
+    for row in range(rows):
+        for column in range(columns):
+            if cells[row, column]:
+                for j in range(2 * row, 2 * row + 3):
+                    for i in range(2 * column, 2 * column + 3):
+                        crossings[j * step, i * step] = True
+    return 0
