@@ -14,7 +14,7 @@ from lib.lod.thinned import Thinned
 from lib.nurbs.facets import normals
 from lib.report import picture
 from lib.report.camera import Camera
-from lib.surfaces import tessellate
+from lib.surfaces import mesh_build, tessellate
 from lib.surfaces.closed import in_closed_shell
 from lib.surfaces.measure import corners, transformed
 from lib.visibility import closest
@@ -113,6 +113,24 @@ def test_distance_holds_by_closest_points(ball, tolerance):
         far = closest.closest(closest.prepare(W, G), points)[0]
         assert far.max() <= 1.1 * tolerance + FLOAT32
     assert patch.square <= patch.distance**2
+
+
+def two_squares(lifts, sides=(3.0, 1.0)):
+    """V, UV, F of squares side by side in z = 0, lifted; their areas are the squares of their sides."""
+    V = [[[x, 0, z], [x + a, 0, z], [x + a, a, z], [x, a, z]] for x, a, z in zip((0, 5), sides, lifts, strict=True)]
+    F = np.array([[0, 1, 2], [0, 2, 3]])
+    return np.array(V, dtype=float).reshape(-1, 3), np.zeros((8, 2)), np.concatenate([F, F + 4])
+
+
+def test_the_mean_square_is_by_area_and_the_distance_both_ways():
+    V, _, F = two_squares((0.0, 0.0))
+    original = Original(mesh_build.mesh(V, F)[0])
+    found = original.measure(*two_squares((0.0, 0.1)))
+    assert found.square == pytest.approx(0.1**2 * 1 / 10) and found.distance == pytest.approx(0.1)
+    V, UV, F = two_squares((0.0, 0.0))
+    V, UV = np.concatenate([V, V[:3] + [0, 0, 0.2]]), np.zeros((11, 2))  # and a triangle that the original has not
+    found = original.measure(V, UV, np.concatenate([F, [[8, 9, 10]]]))
+    assert found.square == 0 and found.distance == pytest.approx(0.2)
 
 
 def test_fewer_triangles_are_farther(ball):

@@ -71,6 +71,20 @@ def test_a_cube_keeps_its_edges_and_a_cylinder_is_round():
     assert np.abs(m.N - normals_areas(m.V, m.F)[0][:, None]).max() < 1e-12
 
 
+def test_normals_of_folds_that_overhang_stay_on_the_lit_side():
+    """Triangles around the tip of a cone over a winding curve: smooth all round, some turned away from their mean."""
+    t = np.arange(240) / 240 * 2 * np.pi
+    around, up = t - 0.6 * np.sin(4 * t), 0.5 * np.cos(4 * t)
+    rim = np.stack([np.cos(up) * np.cos(around), np.cos(up) * np.sin(around), np.sin(up)], axis=1)
+    m, _ = mesh(np.vstack([rim, np.zeros(3)]), [(k, (k + 1) % 240, 240) for k in range(240)])
+    face, _ = normals_areas(m.V, m.F)
+    tip = m.N[m.F == np.flatnonzero((m.V == 0).all(axis=1))[0]]
+    along = np.einsum("ij,ij->i", tip, face)
+    assert along.min() > 0
+    turned = np.isclose(along, 1.0, atol=1e-12)  # these have their own normal, the others the mean of all
+    assert 0 < turned.sum() < 240 and np.ptp(tip[~turned], axis=0).max() < 1e-12
+
+
 def test_normals_of_the_file_count_unless_they_oppose_the_winding():
     given = np.array([[[0, 0.6, 1.6], [0, 0, 5], [0, 0, -1]], [[np.nan, 0, 0], [0, 0, 0], [0, 1, 1]]])
     m, dropped = mesh(SQUARE, [[0, 1, 2], [0, 2, 3]], given)
