@@ -92,15 +92,16 @@ def test_a_mesh_keeps_its_triangles_and_normals(tmp_path):
 
 def test_meshes_with_colours_and_without_an_area_are_named(tmp_path):
     made = model()
-    for height in (1.0, 0.0):
+    for height, has_colours in ((1.0, True), (0.0, True), (2.0, False)):
         mesh = rhino3dm.Mesh()
         for x, y in ((0, 0), (2, 0), (2, height)):
             mesh.Vertices.Add(x, y, 0)
-            mesh.VertexColors.Add(255, 128, 0)
+            if has_colours:
+                mesh.VertexColors.Add(255, 128, 0)
         mesh.Faces.AddFace(0, 1, 2)
         made.Objects.AddMesh(mesh)
     content = read(written(made, tmp_path / "a.3dm"))
-    assert [patch.number for patch in content.patches] == [1] and content.total == 2
+    assert [patch.number for patch in content.patches] == [1, 3] and content.total == 3
     assert content.notes == ["meshes without an area are left out: part/2", "vertex colours are not used: part/1"]
     assert refused(tmp_path / "a.3dm", only="2").startswith("a.3dm: no mesh has an area")
 
