@@ -14,10 +14,21 @@ ROOT = Path(__file__).resolve().parents[1]
 if str(ROOT) not in sys.path:
     sys.path.insert(0, str(ROOT))
 
-from benchmarks.hard_cases import closed, contacts, curved, lamps, near, resampling, scale, seams, shadows  # noqa: E402
+from benchmarks.hard_cases import (  # noqa: E402
+    accounts,
+    closed,
+    contacts,
+    curved,
+    lamps,
+    near,
+    resampling,
+    scale,
+    seams,
+    shadows,
+)
 from benchmarks.hard_cases.bench import Bench  # noqa: E402
 
-TOPICS = closed, near, shadows, contacts, curved, seams, lamps, scale, resampling
+TOPICS = closed, accounts, near, shadows, contacts, curved, seams, lamps, scale, resampling
 CASES = {f.__name__: f for topic in TOPICS for f in topic.CASES}
 HEAD = """# Accuracy on hard cases
 

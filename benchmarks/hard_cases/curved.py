@@ -3,18 +3,13 @@
 import numpy as np
 
 from benchmarks.hard_cases.bench import DENSE, Figure, crossings, looked_up, numeric_rectangle, rms, worst
+from benchmarks.hard_cases.shadows import bowl
 from lib.nurbs.evaluate import frame_grid
 from lib.nurbs.shape import transformed
 from tests.rooms import cube
-from tests.shapes import cylinder, rectangle, revolved, sphere
+from tests.shapes import cylinder, rectangle, sphere
 
 LEAST = 0.1  # n . l from which the exact surface sees the light
-
-
-def bowl(radius=1.0):
-    """The lower half of a sphere, normals outwards."""
-    w = np.sqrt(0.5)
-    return revolved(radius * np.array([[0, -1], [1, -1], [1, 0]]), [1, w, 1], 2, [0, 0, 0, 1, 1, 1])
 
 
 def own_tessellation(bench):

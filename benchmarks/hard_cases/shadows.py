@@ -6,7 +6,7 @@ from benchmarks.hard_cases.bench import DENSE, STANDARD, Figure, crossings, look
 from lib.formats import trees
 from lib.nurbs.shape import transformed
 from tests.rooms import cube
-from tests.shapes import box, rectangle, sphere
+from tests.shapes import box, rectangle, revolved, sphere
 
 FLOOR = [-1.0, -1, 0], [2.0, 0, 0], [0.0, 2, 0]
 LAMP = np.array([-0.2, -0.2]), np.array([0.2, 0.2])  # at height 1, looking down
@@ -32,6 +32,12 @@ def below_sheet(x, low, high, height, lamp_low=LAMP[0], lamp_high=LAMP[1]):
     whole = parallel_rectangle(x, np.asarray(lamp_low), np.asarray(lamp_high), 1.0)
     left = whole - parallel_rectangle(x, *hidden, 1.0)
     return np.where(left > DARK, left, 0.0)
+
+
+def bowl(radius=1.0):
+    """The lower half of a sphere, normals outwards."""
+    w = np.sqrt(0.5)
+    return revolved(radius * np.array([[0, -1], [1, -1], [1, 0]]), [1, w, 1], 2, [0, 0, 0, 1, 1, 1])
 
 
 def penumbra(bench):
@@ -111,6 +117,26 @@ def interpenetration(bench):
     yield Figure("ball sunk in the floor: maps that are not finite", "none", 0, float(broken))
 
 
+def open_sheets(bench):
+    """The back of a table top over the floor, a ball in an open bowl: sheets hide nothing by themselves."""
+    table = sheet([-0.4, -0.3], [0.4, 0.3], 0.4)[0]
+    surfaces = {"floor": (rectangle(*FLOOR), {}), "lamp": lamp(), "table": (table, {})}
+    _, hidden = bench.maps(surfaces, {"floor": 0.5, "lamp": 0.0, "table": 0.5})["floor"]
+    yield Figure("floor below a table top that is one sheet: texels taken for buried", "none", 0, float(hidden.sum()))
+    small = np.diag([0.3, 0.3, 0.3, 1.0])
+    ball, pot = small.copy(), small.copy()
+    ball[2, 3], pot[2, 3] = 0.5, 0.7  # the bowl stands 0.1 above the floor, the ball in it
+    pot[:3, :3] *= 2
+    surfaces = {"floor": (rectangle(*FLOOR), {}), "lamp": lamp(height=1.5), "ball": (transformed(sphere(), ball), {})}
+    surfaces["bowl"] = transformed(bowl(), pot), {"flip": True}
+    maps = bench.maps(surfaces, {name: 0.5 for name in surfaces} | {"lamp": 0.0})
+    count = sum(hidden.sum() for _, hidden in maps.values())
+    yield Figure("ball in an open bowl: texels taken for buried", "none", 0, float(count))
+    H = maps["ball"][0]
+    dark = (H.min(axis=-1) <= 0).sum()
+    yield Figure("ball in an open bowl: dark texels of the ball", "none", 0, float(dark))
+
+
 def _largest(H, where):
     return float(H[where].max() / H.max())
 
@@ -126,4 +152,4 @@ def crossing_height(n):
     return np.where(t < 1, lower, upper)
 
 
-CASES = [penumbra, contact, thin_wall, interpenetration]
+CASES = [penumbra, contact, thin_wall, interpenetration, open_sheets]
