@@ -4,8 +4,6 @@ Baum et al. 1991 balance over edges; here corners count too, so that every leaf 
 level. A tree is a list `divided`: divided[l] is (n_v 2^l, n_u 2^l) bool, the cells of level l that have children.
 """
 
-import numpy as np
-
 
 def balance(divided, closed=(False, False)):
     """The smallest balanced tree that contains the given one: a new list of arrays.
@@ -37,7 +35,7 @@ def grow(cells, closed=(False, False)):
 
 def _grow_along(cells, axis, closed):
     grown = cells.copy()
-    source, target = np.moveaxis(cells, axis, 0), np.moveaxis(grown, axis, 0)
+    source, target = (cells.T, grown.T) if axis else (cells, grown)
     target[1:] |= source[:-1]
     target[:-1] |= source[1:]
     if closed:

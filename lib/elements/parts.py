@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lib.elements.grids import POINTS, by_element
+from lib.elements.tree_kernels import number_parts
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,9 @@ def parts(blocked_u, blocked_v, usable):
     rows, columns = usable.shape
     label = _components(blocked_u, blocked_v, usable)
     label = by_element(label)
-    counts = (label[:, :, None] == np.arange(POINTS**2)).sum(axis=1)
+    first = np.arange(len(label))[:, None] * (POINTS**2 + 1)  # -1 counts as the number 16
+    counts = np.bincount((first + label % (POINTS**2 + 1)).ravel(), minlength=len(label) * (POINTS**2 + 1))
+    counts = counts.reshape(len(label), -1)[:, :-1]
     largest = counts.argmax(axis=1)
     keeps = label == largest[:, None]
     is_cut = (counts > 0).sum(axis=1) > 1
@@ -47,20 +50,6 @@ def parts(blocked_u, blocked_v, usable):
 
 def _components(blocked_u, blocked_v, usable):
     """Number of the part of each point within its element, 0..15; -1 where not usable.  (4 n_v, 4 n_u)."""
-    rows, columns = usable.shape
-    j, i = np.mgrid[:rows, :columns]
-    label = np.where(usable, (j % POINTS) * POINTS + i % POINTS, -1)
-    open_u = ~blocked_u & usable[:, 1:] & usable[:, :-1] & ((np.arange(1, columns) % POINTS) > 0)
-    open_v = ~blocked_v & usable[1:] & usable[:-1] & ((np.arange(1, rows) % POINTS) > 0)[:, None]
-    for _ in range(POINTS**2):
-        before = label.copy()
-        for axis, link in ((1, open_u), (0, open_v)):
-            first, last = [slice(None)] * 2, [slice(None)] * 2
-            first[axis], last[axis] = slice(None, -1), slice(1, None)
-            least = np.minimum(label[tuple(first)], label[tuple(last)])
-            label[tuple(first)] = np.where(link, least, label[tuple(first)])
-            least = np.minimum(label[tuple(first)], label[tuple(last)])
-            label[tuple(last)] = np.where(link, least, label[tuple(last)])
-        if (label == before).all():
-            break
+    label = np.empty(usable.shape, dtype=np.int64)
+    number_parts(*(np.ascontiguousarray(a) for a in (blocked_u, blocked_v, usable)), POINTS, label)
     return label

@@ -1,4 +1,4 @@
-"""Compiled loops over the cells of one level of a quadtree (see lib.elements.quadtree).
+"""Compiled loops over the cells of one level of a quadtree (see lib.elements.quadtree), and the points of elements.
 
 value (h, w, C) float32, hidden (h, w) bool lie on the tree's whole lattice, of which a level's crossings are every
 step-th.  Light is the sum of all groups of three channels.  Every kernel writes into the arrays it is given last.
@@ -99,4 +99,39 @@ def mark_crossings(cells, step, crossings):
                 for j in range(2 * row, 2 * row + 3):
                     for i in range(2 * column, 2 * column + 3):
                         crossings[j * step, i * step] = True
+    return 0
+
+
+@compiled("b1[:,:], b1[:,:], b1[:,:], i8, i8[:,:]")
+def number_parts(blocked_u, blocked_v, usable, side, label):
+    """Number of the part of each point within its element of side x side points: the least number j side + i of the
+    points it hangs together with, -1 where not usable; label (rows, columns) comes back.
+
+    blocked_u (rows, columns - 1), blocked_v (rows - 1, columns): links between neighbours that do not hold.
+    """
+    rows, columns = usable.shape
+    for j in range(rows):
+        for i in range(columns):
+            label[j, i] = j % side * side + i % side if usable[j, i] else -1
+    for row in range(rows // side):
+        for column in range(columns // side):
+            top, left, changes = row * side, column * side, True
+            while changes:  # numbers sink along the links
+                changes = False
+                for j in range(top, top + side):
+                    for i in range(left, left + side):
+                        if not usable[j, i]:
+                            continue
+                        least = label[j, i]
+                        if i > left and usable[j, i - 1] and not blocked_u[j, i - 1]:
+                            least = min(least, label[j, i - 1])
+                        if i < left + side - 1 and usable[j, i + 1] and not blocked_u[j, i]:
+                            least = min(least, label[j, i + 1])
+                        if j > top and usable[j - 1, i] and not blocked_v[j - 1, i]:
+                            least = min(least, label[j - 1, i])
+                        if j < top + side - 1 and usable[j + 1, i] and not blocked_v[j, i]:
+                            least = min(least, label[j + 1, i])
+                        if least < label[j, i]:
+                            label[j, i] = least
+                            changes = True
     return 0

@@ -2,6 +2,8 @@
 
 import numpy as np
 import pytest
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from lib.elements import tree_kernels
 
@@ -59,3 +61,30 @@ def test_nine_crossings_of_a_cell():
     crossings = np.zeros((9, 17), dtype=bool)
     tree_kernels.mark_crossings(np.array([[False, True]]), 4, crossings)
     assert sorted(zip(*np.nonzero(crossings), strict=True)) == [(j, i) for j in (0, 4, 8) for i in (8, 12, 16)]
+
+
+def test_parts_are_connected_components():
+    rng = np.random.default_rng(9)
+    side, rows, columns = 4, 8, 12
+    usable = rng.random((rows, columns)) < 0.8
+    blocked_u, blocked_v = rng.random((rows, columns - 1)) < 0.4, rng.random((rows - 1, columns)) < 0.4
+    label = np.empty((rows, columns), dtype=np.int64)
+    tree_kernels.number_parts(blocked_u, blocked_v, usable, side, label)
+    assert np.array_equal(label >= 0, usable)
+    number = np.arange(rows * columns).reshape(rows, columns)
+    links = [
+        (
+            number[:, :-1],
+            number[:, 1:],
+            ~blocked_u & usable[:, 1:] & usable[:, :-1] & (np.arange(1, columns) % side > 0),
+        ),
+        (number[:-1], number[1:], ~blocked_v & usable[1:] & usable[:-1] & (np.arange(1, rows) % side > 0)[:, None]),
+    ]
+    first, last = (np.concatenate([pair[k][pair[2]] for pair in links]) for k in (0, 1))
+    graph = coo_array((np.ones(len(first)), (first, last)), shape=(number.size, number.size))
+    part = connected_components(graph, directed=False)[1].reshape(rows, columns)
+    j, i = np.indices((rows, columns))
+    own = j % side * side + i % side
+    for p in np.unique(part[usable]):
+        mine = (part == p) & usable
+        assert (label[mine] == own[mine].min()).all()
