@@ -8,7 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-BATCH = 16384  # points evaluated at once: their control points stay in the cache
+from lib.nurbs.surface_kernels import evaluate_points
+
 REMEMBERED = 8192  # numbers in the largest basis matrix that is kept
 DEGENERATE = 1e-10  # |S_u x S_v| below this share of the surface's own scale has no direction in float64
 NUDGES = (1e-7, 1e-5, 1e-3)  # steps into the domain: the limit to 1e-7 at a plain pole, later ones for higher orders
@@ -51,22 +52,11 @@ def _shift(a, left):
 def evaluate(surface, u, v):
     """Points and first derivatives at parameters u, v (m,) in [0, 1]: S, S_u, S_v, each (m, 3)."""
     u, v = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64))
-    out = np.empty((3, u.size, 3))
-    for first in range(0, u.size, BATCH):
-        part = slice(first, first + BATCH)
-        out[:, part] = _evaluate(surface, u[part], v[part])
-    return out[0], out[1], out[2]
-
-
-def _evaluate(surface, u, v):
+    u, v, Pw = (np.ascontiguousarray(x) for x in (u, v, surface.Pw))
     p, q = surface.degree_u, surface.degree_v
-    k, N, dN = basis(surface.knots_u, p, surface.Pw.shape[0], u)
-    m, M, dM = basis(surface.knots_v, q, surface.Pw.shape[1], v)
-    Pw = surface.Pw[(k[:, None] + np.arange(-p, 1))[:, :, None], (m[:, None] + np.arange(-q, 1))[:, None, :]]
-    rows = np.einsum("kb,kabc->kac", M, Pw)
-    A, A_u = np.einsum("ka,kac->kc", N, rows), np.einsum("ka,kac->kc", dN, rows)
-    A_v = np.einsum("ka,kac->kc", N, np.einsum("kb,kabc->kac", dM, Pw))
-    return _project(A, A_u, A_v)
+    out = np.empty((3, u.size, 3))
+    evaluate_points(surface.knots_u, surface.knots_v, Pw, p, q, u, v, np.empty((4, max(p, q) + 1)), out)
+    return out[0], out[1], out[2]
 
 
 def _project(A, A_u, A_v):
