@@ -3,8 +3,9 @@
 Starting an interpreter and importing numpy and a stage costs a job 0.15 to 0.25 CPU s, more than what most jobs of a
 small scene do; a fork costs 0.01 s.  `start` is called once by the Snakefile when a run begins; jobs reach the process
 through `stages/__main__.py`, which runs the stage by itself where there is no such process (on other machines, by
-hand).  Modules are loaded when the first job asks for them, before the fork; none of them starts a thread when it is
-loaded, which a fork would lose.
+hand).  A stage is loaded when its first job comes, before the fork; what that job found to load besides, such as
+scipy.spatial for trimmed surfaces, is loaded before the next of its kind.  No module starts a thread when it is loaded,
+which a fork would lose.
 
 A request is a message of 8 bytes, the length of what follows, and texts with a zero byte between them: working folder,
 number of arguments, stage, arguments, NAME=VALUE of the environment; with it come the file descriptors of standard
@@ -28,6 +29,7 @@ from typing import NamedTuple
 
 VARIABLE = "BAKE_WARM"  # of the environment: where jobs find the address
 _HEAD = 8
+MOST_TOLD = 1 << 15  # bytes of names of modules: half of what a pipe holds
 
 
 def start():
@@ -63,12 +65,22 @@ class Request(NamedTuple):
     environment: dict
 
 
+class Child(NamedTuple):
+    """A job: its stage, process and the descriptor of that, and the end of a pipe that tells what it had to load."""
+
+    stage: str
+    pid: int
+    descriptor: int
+    loaded: int
+
+
 class Jobs:
     """Forks children for requests that come on the socket `listener`, and answers with their exit status."""
 
     def __init__(self, listener):
         self._listener, self._events = listener, selectors.DefaultSelector()
-        self._children = {}  # {connection: (process id, its descriptor)}
+        self._children = {}  # {connection: Child}
+        self._learned = {}  # {stage: modules that its last job had to load}
 
     def serve(self, lifeline):
         """Until the file `lifeline` is at its end; then the children are ended too."""
@@ -77,35 +89,38 @@ class Jobs:
         while True:
             for key, _ in self._events.select():
                 if key.fileobj is lifeline:
-                    for pid, _ in self._children.values():
-                        os.kill(pid, signal.SIGTERM)
+                    for child in self._children.values():
+                        os.kill(child.pid, signal.SIGTERM)
                     return
                 if key.fileobj is self._listener:
                     self._begin(self._listener.accept()[0])
-                elif key.fileobj is key.data:  # who asked was stopped
-                    os.kill(self._children[key.data][0], signal.SIGTERM)
-                    self._events.unregister(key.data)
-                else:
+                elif key.fileobj is not key.data:
                     self._end(key.data)
+                elif key.data in self._children:  # who asked was stopped
+                    os.kill(self._children[key.data].pid, signal.SIGTERM)
+                    self._events.unregister(key.data)
 
     def _begin(self, connection):
         try:
             request, streams = _received(connection)
-            pid = _forked(request, streams, [self._listener, connection, *self._children])
+            _load(f"stages.{request.stage}", *self._learned.pop(request.stage, ()))
+            child = _forked(request, streams, [self._listener, connection, *self._children])
         except (OSError, ValueError):  # who asked has gone, or there is no room for a process: nothing is answered
             connection.close()
             return
-        self._children[connection] = pid, os.pidfd_open(pid)
-        for event in (connection, self._children[connection][1]):
+        self._children[connection] = child
+        for event in (connection, child.descriptor):
             self._events.register(event, selectors.EVENT_READ, connection)
 
     def _end(self, connection):
-        pid, descriptor = self._children.pop(connection)
-        status = os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
+        child = self._children.pop(connection)
+        status = os.waitstatus_to_exitcode(os.waitpid(child.pid, 0)[1])
+        with open(child.loaded) as file:
+            self._learned[child.stage] = file.read().split()
         with suppress(KeyError):
             self._events.unregister(connection)
-        self._events.unregister(descriptor)
-        os.close(descriptor)
+        self._events.unregister(child.descriptor)
+        os.close(child.descriptor)
         with suppress(OSError):
             connection.sendall(str(status if status >= 0 else 128 - status).encode())  # as a shell has it
         connection.close()
@@ -123,24 +138,29 @@ def _received(connection):
     return Request(folder, stage, rest[: int(n)], dict(word.split("=", 1) for word in rest[int(n) :])), streams
 
 
+def _load(*modules):
+    """Import what can be imported: the job will say what is wrong with the rest."""
+    for name in modules:
+        with suppress(Exception):
+            importlib.import_module(name)
+
+
 def _forked(request, streams, sockets):
-    """Process id of a child that runs the request, with these streams and without these sockets."""
-    name = f"stages.{request.stage}"
-    with suppress(Exception):  # the child will say what is wrong with it
-        importlib.import_module(name)
+    """A Child that runs the request, with these streams and without these sockets."""
     gc.collect()
     gc.freeze()  # what is loaded stays shared: the children's collections leave it alone
+    loaded, tells = os.pipe()
     pid = os.fork()
     if not pid:
-        _run(name, request, streams, sockets)
-    for stream in streams:
-        os.close(stream)
-    return pid
+        _run(request, streams, sockets, tells)
+    for descriptor in (*streams, tells):
+        os.close(descriptor)
+    return Child(request.stage, pid, os.pidfd_open(pid), loaded)
 
 
-def _run(name, request, streams, sockets):
+def _run(request, streams, sockets, tells):
     """Become the job; does not return."""
-    status = 1
+    status, known = 1, set(sys.modules)
     try:
         for number, stream in enumerate(streams):
             os.dup2(stream, number)
@@ -151,6 +171,7 @@ def _run(name, request, streams, sockets):
         os.chdir(request.folder)
         os.environ.clear()
         os.environ.update(request.environment)
+        name = f"stages.{request.stage}"
         sys.argv = [name, *request.arguments]
         status = importlib.import_module(name).main(request.arguments)
     except SystemExit as end:  # from argparse
@@ -161,10 +182,12 @@ def _run(name, request, streams, sockets):
         with suppress(Exception):
             sys.stdout.flush()
             sys.stderr.flush()
+            os.write(tells, " ".join(sorted(set(sys.modules) - known)).encode()[:MOST_TOLD])
         os._exit(status)
 
 
 if __name__ == "__main__":
     import numpy.ma  # noqa: F401  what numpy itself loads when a job first sorts
+
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the jobs hear it, and Snakemake, which ends this process
     Jobs(socket.socket(fileno=int(sys.argv[1]))).serve(sys.stdin)

@@ -35,6 +35,7 @@ STAGES = {
     "breaks": "def main(argv):\n    raise ValueError('too dark')\n",
     "crashes": "import os\ndef main(argv):\n    os.kill(os.getpid(), 9)\n",
     "refuses": "import argparse\ndef main(argv):\n    argparse.ArgumentParser().parse_args(argv)\n",
+    "loads": "import sys\ndef main(argv):\n    print('lately' in sys.modules)\n    import lately\n",
     "waits": "import os, time\ndef main(argv):\n    open(argv[0], 'w').write(str(os.getpid()))\n    time.sleep(60)\n",
 }
 
@@ -117,6 +118,11 @@ def test_jobs_run_side_by_side_in_forks_of_one_process(home, keeper):
     for job in jobs:
         job.kill()
         job.wait()
+
+
+def test_what_a_job_had_to_load_is_there_for_the_next_of_its_stage(home, keeper):
+    (home / "lately.py").write_text("")
+    assert [asked(home, keeper[1], "loads").stdout for _ in range(3)] == ["False\n", "True\n", "True\n"]
 
 
 @pytest.mark.parametrize("address", ["", "/nowhere/jobs", "stale"])
