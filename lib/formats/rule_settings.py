@@ -8,7 +8,7 @@ from pathlib import Path
 from lib.formats.artefact import atomic
 from lib.radiosity.quality import quality
 
-RAYS_A_JOB = 12e6  # about 4 s of one core
+RAYS_A_JOB = 24e6  # about 4 s of one core
 MOST_CHUNKS = 64
 MESH_RAYS = 8  # a finest cell of a mesh's map: some are sampled whatever the light
 SHADOW_RAYS = 24  # a sample, of a few lights in view
