@@ -11,7 +11,7 @@ from lib import warm_start
 from lib.door import stopped
 from lib.formats import preflight
 from lib.formats.artefact import ArtefactError
-from lib.formats.rule_settings import n_chunks, rule_settings, short
+from lib.formats.rule_settings import lod_levels, n_chunks, rule_settings, short
 from lib.refusal import Refusal
 from lib.stage_code import stage_digests
 
@@ -48,7 +48,8 @@ SETTINGS = short(SLICES, f"{OUT}/settings")
 MAPPED = [f for f, role, black in zip(scene.files, scene.roles, scene.is_black) if role != "cast_only" and not black]
 N_CHUNKS = n_chunks(scene.settings, len(MAPPED), scene.mesh_cells)
 CHUNKS = range(N_CHUNKS)
-LEVELS = range(len(scene.settings["lods"]))
+LODS = lod_levels(scene.settings["lods"])
+LEVELS = range(len(LODS))
 MAPS = [f"{OUT}/maps/{file}.exr" for file in MAPPED]
 LOST_MAPS = [path for path in MAPS if not os.path.exists(path)]
 
@@ -85,6 +86,7 @@ rule all:
         f"{OUT}/report.json",
         f"{OUT}/scene.glb",
         f"{OUT}/lods.json",
+        [f"{OUT}/scene_LOD{k}.gltf" for k in LEVELS],
         LOST_MAPS[:1],  # one job makes all; Snakemake takes seconds to look up thousands
 
 
@@ -279,8 +281,14 @@ if scene.has_meshes:
             " --log {log.text:q} --cost {log.cost:q}"
 
 
+def finest_level(wildcards):
+    """The level that this one is a share of, and is cut after."""
+    return f"{STAGE}/lod_export/lod_0.npz" if LODS[int(wildcards.k)][1] else []
+
+
 rule lod_export:
     input:
+        finest=finest_level,
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
         ladder=rules.thin_meshes.output if scene.has_meshes else [],
@@ -293,12 +301,13 @@ rule lod_export:
         cost=f"{STAGE}/lod_export/cost_{{k}}.json",
     params:
         *code("lod_export"),
-        levels=SETTINGS["lod_export"],
+        level=lambda wildcards: LODS[int(wildcards.k)][0],
+        finest=lambda wildcards: ["--finest", finest_level(wildcards)] if finest_level(wildcards) else [],
         more=["--textures", f"{STAGE}/budget_reduce/textures.npz"] if "gouraud" in scene.reconstruction.values() else [],
         ladder=["--ladder", f"{STAGE}/thin_meshes/ladder.npz"] if scene.has_meshes else [],
         reconstruction=SETTINGS["reconstruction"],
     shell:
-        "{RUN} lod_export --scene {input.scene:q} --casters {input.casters:q} --levels {params.levels:q} --units m"
+        "{RUN} lod_export --scene {input.scene:q} --casters {input.casters:q} --level {params.level:q} {params.finest:q} --units m"
         " --level-index {wildcards.k} {params.ladder:q} {params.more:q} --reconstruction {params.reconstruction:q} --out {output:q}"
         " --log {log.text:q} --cost {log.cost:q}"
 

@@ -30,8 +30,9 @@ def arguments(parser):
     parser.add_argument("--casters", required=True, metavar="FILE", help="casters.npz")
     parser.add_argument("--ladder", metavar="FILE", help="ladder.npz, of the scene's meshes")
     parser.add_argument("--textures", metavar="FILE", help="textures.npz, for light in vertices")
-    parser.add_argument("--levels", required=True, type=door.json_text, metavar="JSON", help="all levels, finest first")
-    parser.add_argument("--level-index", required=True, type=int, metavar="K", help="which of them to cut, from 0")
+    parser.add_argument("--level", required=True, type=door.json_text, metavar="JSON", help="the level asked for")
+    parser.add_argument("--level-index", required=True, type=int, metavar="K", help="its number, 0 is the finest")
+    parser.add_argument("--finest", metavar="FILE", help="lod_<j>.npz, of whose triangles it is a share")
     parser.add_argument("--units", default="m", choices=sorted(METRES), help="of lengths without a unit (default m)")
     parser.add_argument("--reconstruction", type=door.json_text, default={}, metavar="JSON", help="{surface: way}")
     parser.add_argument("--out", required=True, metavar="FILE", help="lod_<k>.npz")
@@ -39,17 +40,15 @@ def arguments(parser):
 
 def body(args, cost):
     x, shapes = scene.load(args.scene), casters.load(args.casters)
-    levels = [asked if isinstance(asked, dict) else {"share": asked} for asked in args.levels]
-    if not 0 <= args.level_index < len(levels):
-        raise refusal(f"{args.level_index}, allowed are 0 to {len(levels) - 1}", field="level-index")
     own, of = np.flatnonzero(x.front < 0), shapes_of(x.front)
     surfaces = tessellate.into_frame([x.surfaces[s] for s in own], shapes.centre, shapes.scale)
-    k, asked = args.level_index, levels[args.level_index]
+    k, asked = args.level_index, args.level if isinstance(args.level, dict) else {"share": args.level}
     try:
         lines = lattice(x.names, args.textures, args.reconstruction)
         lines = {int(of[s]): joined(lines, np.flatnonzero(of == of[s])) for s in lines}
         pieces = scene_of(surfaces, known(shapes, own), lines, np.bincount(of), args.ladder)
-        level = cut(pieces, levels, k, args.units, shapes.scale)
+        count = len(lod_mesh.load(args.finest).F) if args.finest else None
+        level = cut(pieces, asked, count, args.units, shapes.scale)
     except TooFine as error:
         raise refusal(f"{json.dumps(asked)} {error}", field=f"lods[{k}]") from None
     note = ""
@@ -114,21 +113,18 @@ def lattice(names, textures, reconstruction):
     return out
 
 
-def cut(pieces, levels, k, units, scale):
-    """The Level `levels[k]` of the Scene `pieces`, whose frame is `scale` metres."""
-    asked = levels[k]
+def cut(pieces, asked, count, units, scale):
+    """The Level `asked` for of the Scene `pieces`, whose frame is `scale` metres.
+
+    count : triangles of the level that it is a share of; None: of the finest there is where none is named
+    """
     if "deviation" in asked:
         return pieces.by_deviation(_deviation(asked, units, scale))
     if "triangles" in asked:
         return pieces.by_count(int(asked["triangles"]))
-    if "triangles" in levels[0]:
-        finest = cut(pieces, levels, 0, units, scale)
-        count = pieces.copies @ np.diff(finest.mesh.face_start)
-        return finest if asked["share"] == 1 else pieces.by_count(int(asked["share"] * count))
-    tolerance = _deviation(levels[0], units, scale) if "deviation" in levels[0] else DEVIATION
-    if asked["share"] == 1:
-        return pieces.by_deviation(tolerance)
-    return pieces.by_count(int(asked["share"] * pieces.n_within(tolerance)))
+    if count is None and asked["share"] == 1:
+        return pieces.by_deviation(DEVIATION)
+    return pieces.by_count(int(asked["share"] * (pieces.n_within(DEVIATION) if count is None else count)))
 
 
 def _deviation(asked, units, scale):

@@ -46,7 +46,6 @@ def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None):
             "profile": settings["export"]["profiles"][0],
             "order": settings["export"].get("budget_order", "loss"),
         },
-        "lod_export": settings["lods"],
         "reconstruction": reconstruction or {},
         "package": {"exposure": settings["export"]["exposure"], "reconstruction": reconstruction or {}},
         "report": {
@@ -59,6 +58,16 @@ def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None):
         },
     }
     return {stage: _text(content) for stage, content in slices.items()}
+
+
+def lod_levels(lods):
+    """[(JSON text of a level, whether it is a share of the first's triangles)]: a job reads its own level alone.
+
+    >>> lod_levels([{"deviation": "1 mm"}, 0.3])
+    [('{"deviation": "1 mm"}', False), ('0.3', True)]
+    """
+    is_share = [not isinstance(level, dict) or "share" in level for level in lods]
+    return [(_text(level), share and not is_share[0]) for level, share in zip(lods, is_share, strict=True)]
 
 
 def short(slices, folder):

@@ -8,7 +8,7 @@ import pytest
 from lib import door
 from lib.formats import settings as scene_settings
 from lib.formats import strict_yaml
-from lib.formats.rule_settings import MOST_CHUNKS, n_chunks, rule_settings, short
+from lib.formats.rule_settings import MOST_CHUNKS, lod_levels, n_chunks, rule_settings, short
 
 DEFAULTS = Path(__file__).parents[2] / "config" / "bake.yaml"
 
@@ -28,8 +28,7 @@ def settings(**changed):
 @pytest.mark.parametrize(
     "changed, stages",
     [
-        ({"lods": [0.5]}, {"lod_export"}),
-        ({"lods": [{"deviation": "1 mm"}]}, {"lod_export"}),
+        ({"lods": [0.5]}, set()),  # each level has a param of its own
         ({"budget": "2 MiB"}, {"budget_reduce"}),
         ({"export__exposure": 2}, {"package"}),
         ({"export__budget_order": "loss_per_byte"}, {"budget_reduce"}),
@@ -56,6 +55,14 @@ def test_a_setting_moves_its_slices_alone(changed, stages):
     moved = {stage for stage in before if before[stage] != after[stage]}
     assert moved - {"report"} == stages
     assert "report" in moved  # it shows them all
+
+
+def test_a_level_is_a_share_of_the_first_if_that_is_none():
+    named, other = {"deviation": "1 mm"}, {"triangles": 60}
+    assert [share for _, share in lod_levels([named, 0.3, {"share": 0.1}, other])] == [False, True, True, False]
+    assert [share for _, share in lod_levels([other, named, 0.3])] == [False, False, True]
+    assert [share for _, share in lod_levels([1.0, 0.3, other])] == [False, False, False]
+    assert [text for text, _ in lod_levels([named, 0.3])] == ['{"deviation": "1 mm"}', "0.3"]
 
 
 def test_the_same_settings_in_another_order_are_the_same_text():

@@ -107,6 +107,17 @@ def test_a_moved_project_is_not_baked_again(project, tmp_path):
     assert at(tmp_path / "there").listed(target) == {}
 
 
+@pytest.mark.parametrize("level", ["0.2", "{triangles: 300}"])
+def test_a_changed_level_is_cut_alone(baked, level):
+    listed = baked.listed(config=["lods=[{deviation: 5 mm}, " + level + "]"])
+    assert listed == {"lod_export": 1, "package": 1, "report": 1}
+
+
+def test_a_changed_first_level_cuts_its_shares_again(baked):
+    assert baked.listed(config=["lods=[{deviation: 6 mm}, 0.3]"]) == {"lod_export": 2, "package": 1, "report": 1}
+    assert baked.listed(config=["lods=[{deviation: 6 mm}]"]) == {"lod_export": 1, "package": 1, "report": 1}
+
+
 def test_a_retune_of_the_levels_casts_no_ray(copied):
     before, maps = json.loads((copied.results / "report.json").read_text()), products(copied.results)
     assert before["run"]["rays"] == before["totals"]["rays"] > 0

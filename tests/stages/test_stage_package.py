@@ -41,7 +41,8 @@ def files(tmp_path):
     at = [str(tmp_path / name) for name in ("scene.npz", "casters.npz")]
     assert tessellate.main(["--scene", at[0], "--out", at[1]]) == 0
     for k in range(len(LEVELS)):
-        argv = ["--scene", at[0], "--casters", at[1], "--levels", json.dumps(LEVELS), "--level-index", str(k)]
+        argv = ["--scene", at[0], "--casters", at[1], "--level", json.dumps(LEVELS[k]), "--level-index", str(k)]
+        argv += ["--finest", str(tmp_path / "lod_0.npz")] if k else []
         assert lod_export.main([*argv, "--out", str(tmp_path / f"lod_{k}.npz")]) == 0
     textured_maps.save(tmp_path / "textures.npz", maps_of(x))
     write_json(tmp_path / "materials.json", {"rho_avg": {name: [0.5, 0.5, 0.25] for name in x.names}})
@@ -140,7 +141,7 @@ def reconstruct(files, ways, level=2):
         textured_maps.save(files / "textures.npz", maps)
     argv = ["--scene", files / "scene.npz", "--casters", files / "casters.npz", "--textures", files / "textures.npz"]
     for k in range(len(LEVELS)):
-        more = ["--levels", json.dumps(LEVELS), "--level-index", k, "--reconstruction", json.dumps(chosen)]
+        more = ["--level", json.dumps(LEVELS[k]), "--level-index", k, "--reconstruction", json.dumps(chosen)]
         more += ["--out", files / f"lod_{k}.npz"]
         assert lod_export.main([str(a) for a in (*argv, *more)]) == 0
     return maps

@@ -74,8 +74,8 @@ def run(folder, home, intensity=None):
     door(apply_base_texture, "apply_base_texture", *both[:2], "--maps", file("maps"), *materials, *given)
     tables = ["--table", str(out / "budget.json"), "--out", file("textures")]
     door(budget_reduce, "budget_reduce", "--maps", file("textured"), *both[2:], *tables)
-    levels = ["--levels", settings["lod_export"], "--level-index", "0", "--units", "m", "--out", file("lod")]
-    door(lod_export, "lod_export", *both, *levels)
+    level = ["--level", json.dumps(found.settings["lods"][0]), "--level-index", "0"]
+    door(lod_export, "lod_export", *both, *level, "--units", "m", "--out", file("lod"))
     given = ["--textures", file("textures"), "--budget", str(out / "budget.json"), "--lods", file("lod")]
     door(package, "package", *both, *materials, *given, "--results", str(out))
     return SimpleNamespace(found=found, out=out, scene=scene.load(file("scene")))
