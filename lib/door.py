@@ -83,10 +83,11 @@ class _Log:
 _open_logs = []
 
 
-def warn(text):
-    """Print a warning to the terminal and the log of the stage that is running."""
+def warn(text, is_told=False):
+    """Print a warning to the terminal, unless it is told there already, and the log of the stage that is running."""
     line = f"warning: {text}"
-    print(line, file=sys.stderr, flush=True)
+    if not is_told:
+        print(line, file=sys.stderr, flush=True)
     for log in _open_logs[-1:]:
         log.add(line)
 

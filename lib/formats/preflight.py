@@ -95,6 +95,13 @@ def load(folder, overrides=None, results_root="results"):
     return Preflight(absolute, str(given / "scene.yaml"), name, **{field: kept[field] for field in _FIELDS})
 
 
+def told(results):
+    """Warnings that the reader of the Snakefile has told the user, from the results folder of a scene."""
+    from lib.formats import artefact
+
+    return artefact.read_json(Path(results) / "preflight.json")["outcome"]["warnings"]
+
+
 def _cleaned(name):
     from lib.formats.names import cleaned
 

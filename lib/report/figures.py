@@ -38,7 +38,7 @@ SAVINGS = {
     "levels_dropped": ("deepest levels dropped before writing, all within a quarter of the tolerance", "levels"),
 }
 
-COUNTED = {*SAVINGS, "levels_removed", "textured_surfaces", "skipped"}
+COUNTED = {*SAVINGS, "levels_removed", "textured_surfaces"}
 
 
 def stage_costs(costs, run):

@@ -39,6 +39,13 @@ def run(found, out="scene.npz"):
     )
 
 
+def test_what_the_snakefile_told_is_told_once(home, capsys, monkeypatch):
+    monkeypatch.setenv("BAKE_RUN", "a run")
+    assert run(preflight.load(home)) == 0
+    assert "skipped" not in capsys.readouterr().err
+    assert "warning: v3_Speeder.3dm: skipped" in Path("log.txt").read_text()
+
+
 def test_the_scene_is_that_of_preflight(home, capsys):
     found = preflight.load(home)
     assert run(found) == 0
