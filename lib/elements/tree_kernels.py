@@ -60,10 +60,11 @@ def residuals(value, hidden, noise, divided, step, errors, residual):
                 continue
             j, i = row * step + half, column * step + half
             worst = departure_of_centre(value, hidden, j, i, half)
-            worst = max(worst, departure(value, hidden, j - half, i, 0, half))
-            worst = max(worst, departure(value, hidden, j + half, i, 0, half))
-            worst = max(worst, departure(value, hidden, j, i - half, half, 0))
-            worst = max(worst, departure(value, hidden, j, i + half, half, 0))
+            for edge in range(4):
+                away, is_row = half * (2 * (edge % 2) - 1), edge < 2
+                at_j, at_i = (j + away, i) if is_row else (j, i + away)
+                along_j, along_i = (0, half) if is_row else (half, 0)
+                worst = max(worst, departure(value, hidden, at_j, at_i, along_j, along_i))
             # A departure within the samples' own noise says nothing.
             doubt = max(noise[j - half, i], noise[j + half, i], noise[j, i - half], noise[j, i + half], noise[j, i])
             residual[row, column] = max(worst - errors * doubt, NONE)
