@@ -14,7 +14,7 @@ import numpy as np
 from lib.elements.balance import balance, children, grow
 from lib.elements.tree_kernels import contrasts, mark_crossings, residuals
 
-CONTACT_CELL = 1 / 200  # of the scene's largest side: cells along a contact are divided down to this
+CONTACT_CELL = 1 / 1000  # of the scene's largest side: cells along a contact are divided down to this
 WIDE, WIDE_LEVELS = 1.0, 2  # root-cell widths; levels below the base
 
 SMALLEST_CELL = 1e-3  # of the scene's largest side: no finer but where asked

@@ -10,9 +10,11 @@ from lib.elements.quadtree import CONTACT_CELL, SMALLEST_CELL, WIDE, WIDE_LEVELS
 SQUARE = Lattice((1, 1))
 
 
-def grown(field, tau, top, lattice=SQUARE, base=1, side=1.0, hidden=None, channels=1, reach=None):
+def grown(
+    field, tau, top, lattice=SQUARE, base=1, side=1.0, hidden=None, channels=1, reach=None, smallest=SMALLEST_CELL
+):
     """Measure and divide to the end; every sample is asked for once.  field, hidden, reach: functions of u, v."""
-    tree = Quadtree(lattice, base, channels, side)
+    tree = Quadtree(lattice, base, channels, side, smallest=smallest)
     asked = 0
     while len(tree.wanted()[0]):
         j, i = tree.wanted()
@@ -118,7 +120,7 @@ def test_hidden_samples_take_no_part():
     def field(u, v):
         return np.where(buried(u, v), 1e6, 1.0)
 
-    tree = grown(field, tau=0.1, top=5, hidden=buried, base=2, side=4 * CONTACT_CELL)
+    tree = grown(field, tau=0.1, top=5, hidden=buried, base=2, side=4 * CONTACT_CELL, smallest=CONTACT_CELL / 8)
     assert tree.level == 2
     rim = grown(field, tau=0.1, top=5, hidden=buried, base=2, side=16 * CONTACT_CELL)
     picture = np.array([[int(c) for c in row] for row in drawing(rim)])
@@ -190,7 +192,8 @@ def test_middles_of_cells_are_compared_as_well():
 
 
 def test_hidden_middles_are_not():
-    tree = grown(spike, tau=0.5, top=3, hidden=lambda u, v: (u == 0.25) & (v == 0.25), side=2 * CONTACT_CELL)
+    own = {"side": 2 * CONTACT_CELL, "smallest": CONTACT_CELL / 8}  # so that only the contact could stop
+    tree = grown(spike, tau=0.5, top=3, hidden=lambda u, v: (u == 0.25) & (v == 0.25), **own)
     assert drawing(tree) == ["2222"] * 4
 
 
