@@ -12,10 +12,13 @@ import numpy as np
 
 from lib import door
 from lib.formats import casters, samples, scene, solution, trees
+from lib.formats.mistakes import listed
 from lib.radiosity.quality import LOOKUPS, gather_rays
 from lib.radiosity.refine import error_of, lookup_table, rays_of_surfaces, refine_direct, refine_indirect
 from lib.radiosity.thresholds import own_light, own_share, thresholds
+from lib.radiosity.turned import lit_behind
 from lib.radiosity.world import World
+from lib.refusal import demand_finite
 
 
 def arguments(parser):
@@ -60,6 +63,11 @@ def body(args, cost):
         top, base = chosen["top"], chosen["base_indirect"]
         smallest = chosen["smallest_cell"]
         done = refine_indirect(world, mine, table, solved, chosen["seed"], tau, top, base, rays, smallest)
+        dark = [s for s in done if not direct[s][0].any() and not done[s].value.any()]
+        if turned := lit_behind(world, dark, chosen["seed"], chosen["shadow_rays"]):
+            names = listed([world.scene.names[s] for s in turned])
+            door.warn(f"no light reaches {names}, but their backs are lit: turned inside out? `flip: true` turns them")
+    demand_finite({world.scene.names[s]: tree.value for s, tree in done.items()})
     lookups = LOOKUPS * float(np.max(solved.mean_H)) if args.half == "indirect" else 0.0
     trees.save(args.out, args.half, {int(s): stored(t, world.n_groups, lookups) for s, t in done.items()}, cost.notes)
     cost.rays = world.tracer.rays

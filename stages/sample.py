@@ -13,6 +13,7 @@ from lib.elements.grids import POINTS
 from lib.formats import casters, samples, scene
 from lib.radiosity.sampling import base_lattice, surface_elements
 from lib.radiosity.world import World
+from lib.refusal import demand_finite
 
 
 def arguments(parser):
@@ -32,6 +33,7 @@ def body(args, cost):
     mine = world.chunk(args.chunks, args.chunk)
     level, seed = chosen["base_direct"], chosen["seed"]
     base, spared = base_lattice(world, mine, seed, level, chosen["first_shadow_rays"])
+    demand_finite({world.scene.names[s]: value for s, (value, *_) in base.items()})
     bounces = chosen["bounces"] != 1 and len(world.emitters.E) > 0
     rays = chosen["rays_per_element"] if bounces else 0
     lit = [s for s in mine if grids.n_u[s]]
