@@ -63,12 +63,10 @@ class FormFactors:
         weight = (entries != -3).astype(np.float64)
         if area is not None:
             weight *= np.repeat(area, R // area.shape[1], axis=1)
-        self._share = weight = weight / np.where((total := weight.sum(axis=1)) > 0, total, 1.0)[:, None]
-        self._meeting = row, column = np.nonzero(entries >= 0)
-        self._met = target = entries[row, column].astype(np.int64)
-        pair, which = np.unique(row * np.int64(n) + target, return_inverse=True)
-        self._row, self._column = pair // max(n, 1), pair % max(n, 1)
-        self._F = np.bincount(which.ravel(), weight[row, column], len(pair)).astype(float)  # bincount of none is int
+        weight /= np.where((total := weight.sum(axis=1)) > 0, total, 1.0)[:, None]
+        self._row, self._ray = np.divmod(np.flatnonzero(entries >= 0), R)
+        self._column = entries[self._row, self._ray].astype(np.int64)  # as often as rays meet it: sorting costs more
+        self._F = weight[self._row, self._ray]
         self.escaped = np.where(entries == -1, weight, 0.0).sum(axis=1)
         self.absorbed = np.where(entries == -2, weight, 0.0).sum(axis=1)
         self.met = 1 - self.escaped - self.absorbed
@@ -81,9 +79,8 @@ class FormFactors:
         """What the rays bring of B (n, 16, C), which differs over the 16 points of an element, met (n, R) at which:
         (n, C).
         """
-        row, ray = self._meeting
-        found = B[self._met, met[row, ray]] * self._share[row, ray, None]
-        return np.stack([np.bincount(row, c, minlength=self.n) for c in found.T], axis=1)
+        found = B[self._column, met[self._row, self._ray]] * self._F[:, None]
+        return np.stack([np.bincount(self._row, c, minlength=self.n) for c in found.T], axis=1)
 
     def scatter(self, power):
         """sum_i F_ij power_i for power (n, C): (n, C)."""
