@@ -72,17 +72,17 @@ def inlined(function):
     return function
 
 
-def _llvmlite():
+def _llvm():
     """Loaded with the first call of a kernel: who calls none, such as the reader of the Snakefile, needs it not."""
     import llvmlite.binding
 
-    return llvmlite
+    return llvmlite.binding
 
 
 @cache
 def _engine(name):
     """The loaded kernels of a module.  It owns their memory, so it stays."""
-    llvm = _llvmlite().binding
+    llvm = _llvm()
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()
     module = sys.modules[name]
@@ -95,12 +95,12 @@ def _engine(name):
 
 def _target():
     cpu, features = _host()
-    return _llvmlite().binding.Target.from_default_triple().create_target_machine(cpu=cpu, features=features, opt=3, jit=True)
+    return _llvm().Target.from_default_triple().create_target_machine(cpu=cpu, features=features, opt=3, jit=True)
 
 
 @cache
 def _host():
-    return _llvmlite().binding.get_host_cpu_name(), _llvmlite().binding.get_host_cpu_features().flatten()
+    return _llvm().get_host_cpu_name(), _llvm().get_host_cpu_features().flatten()
 
 
 def _object_code(module, target):
@@ -139,7 +139,7 @@ def _keep(path, text):
 
 def _digest(module):
     """Of all that the machine code depends on: the sources, the numbers they take from elsewhere, and the machine."""
-    parts = [sys.version, _llvmlite().__version__, *_host(), Path(__file__).read_text(encoding="utf-8")]
+    parts = [sys.version, str(_llvm().llvm_version_info), *_host(), Path(__file__).read_text(encoding="utf-8")]
     functions = [kernel.__wrapped__ for kernel in _kernels(module)]
     functions += _inlined(functions)
     files = {sys.modules[f.__module__].__file__ for f in functions}
@@ -195,8 +195,8 @@ def _optimised(kernel, numba, target):
     space = {"kernel": numba.njit(error_model="numpy")(kernel.__wrapped__), "carray": numba.carray}
     exec(f"def entry({', '.join(names)}):\n    return kernel({', '.join(actual)})\n", space)
     entry = numba.cfunc(numba.int64(*pointers), error_model="numpy")(space["entry"])
-    llvm = _llvmlite().binding
-    ir = llvm.parse_assembly(entry.inspect_llvmlite().binding)
+    llvm = _llvm()
+    ir = llvm.parse_assembly(entry.inspect_llvm())
     for function in ir.functions:
         if function.name == entry.native_name:
             function.name = kernel.__name__
