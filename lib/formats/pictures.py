@@ -18,7 +18,6 @@ import struct
 from dataclasses import dataclass
 
 import numpy as np
-import OpenImageIO as oiio
 
 from lib.formats.artefact import ArtefactError, atomic
 from lib.maps.colour import linear_to_srgb, srgb_to_linear
@@ -40,6 +39,13 @@ class Header:
     channels: int
     is_float: bool
     has_alpha: bool
+
+
+def _openimageio():
+    """Loaded with the first picture: most scenes have none when they are read."""
+    import OpenImageIO
+
+    return OpenImageIO
 
 
 def read_header(path):
@@ -129,6 +135,7 @@ def _open(path):
         raise Refusal(f"{path}: not found") from None
     except (OSError, ValueError) as error:
         raise Refusal(f"{path}: can not be read: {getattr(error, 'strerror', None) or error}") from None
+    oiio = _openimageio()
     wish = oiio.ImageSpec()
     wish.attribute("oiio:UnassociatedAlpha", 1)  # colours as stored, not multiplied by alpha
     source = oiio.ImageInput.open(path, wish)
@@ -264,6 +271,7 @@ def write_exr(path, linear, metadata=None):
 
 def _write(path, extension, pixels, kind, attributes):
     h, w, channels = pixels.shape
+    oiio = _openimageio()
     spec = oiio.ImageSpec(w, h, channels, kind)
     for name, value in attributes.items():
         if isinstance(value, str | int | float):
