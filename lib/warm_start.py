@@ -191,3 +191,4 @@ if __name__ == "__main__":
 
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the jobs hear it, and Snakemake, which ends this process
     Jobs(socket.socket(fileno=int(sys.argv[1]))).serve(sys.stdin)
+    os._exit(0)  # what is frozen is never collected, which libraries would complain of on the way out

@@ -57,8 +57,8 @@ def body(args, cost):
             f"{level.asked} triangles asked for, these surfaces need {np.bincount(of) @ np.diff(level.mesh.face_start)}"
         )
     elif "deviation" in asked and level.mesh.distance.max() > level.tolerance:
-        reached, wanted = level.mesh.distance.max() * shapes.scale, level.tolerance * shapes.scale
-        note = f"{wanted:.3g} m asked for, {reached:.3g} m reached"
+        wanted, reached = (f"{x * shapes.scale:.3g}" for x in (level.tolerance, level.mesh.distance.max()))
+        note = f"{wanted} m asked for, {reached} m reached" if wanted != reached else ""
     if note and "share" not in asked:  # who asks for a share asks for no number: lods.json tells it
         door.warn(f"lods[{k}]: {note}")
     made = in_metres(level, shapes, of, np.asarray(x.flip, dtype=bool), k, asked, note)
