@@ -115,7 +115,7 @@ def dim(n):
 
 
 AXES = {  # name: (what it counts, sizes, scene of a size)
-    "surfaces": ("surfaces", (10, 32, 100, 320, 1000), lambda n: scene(room() + lamps(2) + tiles(n), QUICK)),
+    "surfaces": ("surfaces", (2, 10, 32, 100, 320, 1000), lambda n: scene(room() + lamps(2) + tiles(n), QUICK)),
     "texels": (
         "texels of all maps",
         (4, 5, 6, 7, 8, 9),
@@ -126,7 +126,7 @@ AXES = {  # name: (what it counts, sizes, scene of a size)
     ),
     "triangles": (
         "triangles that cast shadows",
-        (1e-3, 3e-4, 1e-4, 3e-5, 1e-5),
+        (2e-3, 1e-3, 3e-4, 1e-4, 3e-5, 1e-5),
         lambda sag: scene(room() + lamps(2) + balls(4), {**QUICK, "sag": sag}),
     ),
     "lights": (
@@ -141,7 +141,7 @@ AXES = {  # name: (what it counts, sizes, scene of a size)
     ),
     "elements": (
         "elements",
-        (300, 1000, 3000, 10000, 30000),
+        (300, 1000, 3000, 10000, 30000, 100000),
         lambda n: scene(room() + lamps(2) + balls(4), {**QUICK, "elements": n}),
     ),
 }
