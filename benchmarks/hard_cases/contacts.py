@@ -2,8 +2,8 @@
 
 A room 1 wide and 1 high with a lamp below its ceiling and a bar that lies on the floor from wall to wall, once as long
 as wide and once LONG times that.  Direct light is known in closed form, all light by tracing paths (block_room.py).
-Irradiance is read from the final map, bilinearly; a texel is one of that map.  Nothing is asked of the long room: cells
-along a contact are divided down to a share of the scene's largest side, and it tells what that costs.
+Irradiance is read from the final map, bilinearly; a texel is one of that map.  Cells along a contact are divided down to
+a share of the scene's largest side: the long room tells whether that is enough beside small things.
 """
 
 import numpy as np
@@ -120,7 +120,7 @@ def contact_edges(bench):
             for (light, along), of in found.items():
                 edge = max(of, key=of.get)
                 name = f"{what}, {texels:g} texel from contact edges, {light} light, worst edge ({edge}), {along}"
-                limit = np.inf if length != 1 else ALONG if along.startswith("RMS") else asked
+                limit = asked if along.startswith("mean") else ALONG if length == 1 else np.inf
                 yield Figure(name, "path tracing" if light == "all" else "closed form", limit, of[edge])
 
 
