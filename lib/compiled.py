@@ -52,7 +52,8 @@ class Kernel:
         argtypes = []
         for code, axes in self.types:
             argtypes += [ctypes.c_void_p, *[ctypes.c_int64] * axes] if axes else [NUMBERS[code]]
-        address = _engine(self.__module__).get_function_address(self.__name__)
+        self._engine = _engine(self.__module__)  # as long as it lives, so does the code
+        address = self._engine.get_function_address(self.__name__)
         if not address:
             raise AttributeError(f"{self.__name__} is no kernel of {self.__module__} any more")
         return ctypes.CFUNCTYPE(ctypes.c_int64, *argtypes)(address)
@@ -81,7 +82,7 @@ def _llvm():
 
 @cache
 def _engine(name):
-    """The loaded kernels of a module.  It owns their memory, so it stays."""
+    """The loaded kernels of a module.  It owns their memory."""
     llvm = _llvm()
     llvm.initialize_native_target()
     llvm.initialize_native_asmprinter()

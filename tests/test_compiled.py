@@ -1,5 +1,6 @@
 """lib.compiled: kernels compute what their Python says, are compiled once, and are refused where they can not run."""
 
+import gc
 import importlib.util
 import os
 import subprocess
@@ -51,7 +52,8 @@ def module_of(folder, source=SOURCE, name="kernels_of_a_test"):
 def no_cache_of_the_user(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     yield
-    sys.modules.pop("kernels_of_a_test", None)
+    for name in ("kernels_of_a_test", "other_kernels_of_a_test"):
+        sys.modules.pop(name, None)
 
 
 def arguments():
@@ -142,3 +144,18 @@ def test_where_sources_are_read_only_the_users_cache_serves(tmp_path):
     (tmp_path / "cache").write_text("nor there")
     args = arguments()
     assert module_of(tmp_path).sums(*args) == 3 and args[-1][0] == pytest.approx(9)
+
+
+def test_a_kernel_outlives_the_list_of_engines(tmp_path):
+    """Its machine code belongs to the engine: without that, the process would end here."""
+    (other := tmp_path / "other").mkdir()
+    kernels = module_of(tmp_path)
+    given = arguments()
+    kernels.sums(*given)
+    first = given[-1].copy()
+    compiled._engine.cache_clear()
+    gc.collect()
+    module_of(other, name="other_kernels_of_a_test").sums(*arguments())  # may take the freed memory
+    given[-1][:] = 0
+    kernels.sums(*given)
+    assert (given[-1] == first).all()
