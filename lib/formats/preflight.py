@@ -8,7 +8,7 @@ one as its input re-runs for what is in it and for nothing else.
     materials-<hash>.json   {"rho_avg": {surface: [r, g, b]}}
     textures-<hash>.json    {"textures": {surface: {file (relative to the folder), colour_space, repeat, digest}},
                              "emission": the same of emission pictures, and factor [r, g, b]: W/m2 where it is white}
-    folder.json             {"folder", "file"}: where the scene lies; no rule's input
+    folder.json             {"folder", "file", "warnings"}: where the scene lies, what was told of it; no rule's input
 
 The outcome is kept in preflight.json under the content of all it was made from; a parse that finds nothing changed
 reads that file alone.  So this module's head imports nothing heavy.
@@ -22,7 +22,7 @@ from pathlib import Path
 
 from lib.refusal import Refusal, refusal
 
-VERSION = 5
+VERSION = 6
 ROOT = Path(__file__).resolve().parents[2]
 _FIELDS = (
     "settings", "names", "files", "roles", "is_black", "area", "groups", "tolerances", "reconstruction", "textures",
@@ -95,13 +95,6 @@ def load(folder, overrides=None, results_root="results"):
     return Preflight(absolute, str(given / "scene.yaml"), name, **{field: kept[field] for field in _FIELDS})
 
 
-def told(results):
-    """Warnings that the reader of the Snakefile has told the user, from the results folder of a scene."""
-    from lib.formats import artefact
-
-    return artefact.read_json(Path(results) / "preflight.json")["outcome"]["warnings"]
-
-
 def _cleaned(name):
     from lib.formats.names import cleaned
 
@@ -145,7 +138,8 @@ def _make(given, overrides, home, key, absolute):
     from lib.formats import artefact, scene_check
 
     found = scene_check.run(given, overrides, home / "pictures")
-    slices, texts = {}, {home / "settings" / "folder.json": _text({"folder": str(absolute), "file": found.file})}
+    here = {"folder": str(absolute), "file": found.file, "warnings": found.outcome["warnings"]}
+    slices, texts = {}, {home / "settings" / "folder.json": _text(here)}
     for kind, content in found.slices.items():
         text = _text(content)
         path = home / "settings" / f"{kind}-{_digest(text)[:16]}.json"

@@ -9,9 +9,10 @@ import time
 from pathlib import Path
 
 import numpy as np
+import OpenImageIO as oiio
 import pytest
 
-from lib.formats import pictures, preflight
+from lib.formats import preflight
 from lib.refusal import Refusal
 
 ROOT = Path(__file__).parents[2]
@@ -33,8 +34,8 @@ lods: [{deviation: 1 mm}, {deviation: 2}, {deviation: 1 %}, 0.25, {triangles: 12
 def paint(path, values):
     """A 2 x 2 picture of linear grey values, top row first, 16 bit."""
     codes = np.round(np.array(values, dtype=np.float64) * 65535).astype(np.uint16)
-    out = pictures.oiio.ImageOutput.create(str(path))
-    out.open(str(path), pictures.oiio.ImageSpec(2, 2, 1, "uint16"))
+    out = oiio.ImageOutput.create(str(path))
+    out.open(str(path), oiio.ImageSpec(2, 2, 1, "uint16"))
     out.write_image(codes.reshape(2, 2, 1))
     out.close()
 
