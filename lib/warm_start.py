@@ -35,14 +35,23 @@ MOST_TOLD = 1 << 15  # bytes of names of modules: half of what a pipe holds
 def start():
     """Start the process and put its address into the environment; it ends with this one.
 
-    Nothing is started where the system has no process descriptors (Linux 5.3 and later has them).
+    Nothing is started, and jobs run by themselves, where the system has no process descriptors (Linux 5.3 and later has
+    them) or no place for a socket: its path may hold 107 bytes.
     """
+    os.environ.pop(VARIABLE, None)
     if not hasattr(os, "pidfd_open"):
         return
-    folder = tempfile.mkdtemp(prefix="bake-")  # open to this user alone
+    try:
+        folder = tempfile.mkdtemp(prefix="bake-")  # open to this user alone
+    except OSError:
+        return
     address = os.path.join(folder, "jobs")
     with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as listener:
-        listener.bind(address)
+        try:
+            listener.bind(address)
+        except OSError:
+            shutil.rmtree(folder, ignore_errors=True)
+            return
         listener.listen(128)
         command = [sys.executable, "-P", "-m", "lib.warm_start", str(listener.fileno())]
         process = subprocess.Popen(command, stdin=subprocess.PIPE, pass_fds=[listener.fileno()])

@@ -13,7 +13,7 @@ ADDRESS = "BAKE_WARM"  # lib.warm_start.VARIABLE
 
 def main(argv=None):
     """Run the stage that the first argument names; returns its exit status."""
-    stage, *arguments = sys.argv[1:] if argv is None else argv
+    stage, *arguments = (sys.argv[1:] if argv is None else argv) or sys.exit("python stages STAGE ARGUMENTS")
     status = _asked(os.environ.get(ADDRESS, ""), stage, arguments)
     if status is None:
         os.execv(sys.executable, [sys.executable, "-m", f"stages.{stage}", *arguments])

@@ -135,6 +135,25 @@ def test_without_the_process_a_stage_runs_by_itself(home, address):
     assert (done.returncode, told["argv"], told["own"], told["parent"]) == (3, ["x"], True, os.getpid())
 
 
+@pytest.mark.parametrize("where", ["too long a path", "nowhere"])
+def test_without_a_place_for_its_socket_no_process_is_started(home, where):
+    place = home / ("x" * 110 if where == "too long a path" else "missing")
+    if where == "too long a path":
+        place.mkdir()
+    code = f"import tempfile\ntempfile.tempdir = {str(place)!r}\n" + KEEPER.replace(
+        "[warm_start.VARIABLE]", ".get('BAKE_WARM')"
+    )
+    env = environment(home, BAKE_WARM="/of/another/run")
+    done = subprocess.run([sys.executable, "-c", code], env=env, input="\n", capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stdout) == (0, "None\n"), done.stderr
+    assert not place.exists() or not list(place.iterdir())
+
+
+def test_the_door_without_a_stage_says_what_it_wants():
+    done = subprocess.run(DOOR, capture_output=True, text=True, timeout=60)
+    assert (done.returncode, done.stderr) == (1, "python stages STAGE ARGUMENTS\n")
+
+
 @pytest.mark.parametrize(
     ("stage", "status", "told"),
     [

@@ -13,6 +13,7 @@ import numpy as np
 from lib.nurbs import shape
 from lib.nurbs.evaluate import evaluate_grid, frame_grid
 from lib.nurbs.surface import NurbsSurface
+from lib.surfaces.mesh_build import normals_areas
 
 FLATNESS = 0.01  # chord error of the facets, as a share of the size of the lines they follow
 MEAN_HEIGHT = 2 / 3  # of a paraboloid above the chords of a small cell, in units of its height above the cell's middle
@@ -120,16 +121,16 @@ def simplified(triangles):
     """
     if sum(len(F) for _, F in triangles) <= ENOUGH:
         return triangles
-    size = np.array([np.sqrt(_double_areas(V, F).sum() / 2) for V, F in triangles])
+    size = np.array([np.sqrt(normals_areas(V, F)[1].sum()) for V, F in triangles])
     most = np.maximum(ENOUGH * size / max(size.sum(), 1e-300), LEAST)
     return [_clustered(V, F, n) if len(F) > n else (V, F) for (V, F), n in zip(triangles, most, strict=True)]
 
 
 def _clustered(V, F, n):
     """About n of the triangles F (k, 3) of V; all of them where nothing would be left."""
-    double = _double_areas(V, F)
+    area = normals_areas(V, F)[1].sum()
     used, corner = np.unique(F, return_inverse=True)
-    cell = np.sqrt(double.sum() / n)  # two triangles to a cell
+    cell = np.sqrt(2 * area / n)  # two triangles to a cell
     at = np.floor((V[used] - V[used].min(axis=0)) / cell).astype(np.int64)
     _, cluster, count = np.unique(at, axis=0, return_inverse=True, return_counts=True)
     cluster = cluster.ravel()
@@ -137,12 +138,8 @@ def _clustered(V, F, n):
     few = cluster[corner].reshape(-1, 3)
     first = np.argmin(few, axis=1)[:, None]
     few = np.unique(np.take_along_axis(few, (first + np.arange(3)) % 3, axis=1), axis=0)
-    few = few[_double_areas(mean, few) > 1e-3 * double.sum() / n]
+    few = few[normals_areas(mean, few)[1] > 1e-3 * area / n]
     return (mean, few) if len(few) else (V, F)
-
-
-def _double_areas(V, F):
-    return np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1)
 
 
 def _cell_corners(S):

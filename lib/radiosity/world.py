@@ -18,6 +18,7 @@ from lib.surfaces import boxes
 from lib.surfaces.frames import domain_of, whole
 from lib.surfaces.measure import transformed
 from lib.surfaces.mesh import Mesh
+from lib.surfaces.mesh_build import normals_areas
 from lib.visibility.mesh_lookup import MeshLookup
 from lib.visibility.tracer import Tracer
 
@@ -32,10 +33,6 @@ def _steepest(N):
     """Least cosine between neighbouring unit normals (h, w, 3)."""
     along = [(N[:, 1:] * N[:, :-1]).sum(axis=2), (N[1:] * N[:-1]).sum(axis=2)]
     return min(float(cosine.min(initial=1.0)) for cosine in along)
-
-
-def _area(V, F):
-    return np.linalg.norm(np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]), axis=1).sum() / 2
 
 
 class World:
@@ -148,7 +145,7 @@ class World:
         area = float(self.casters.area[s])
         if len(parts) == 1:
             return [area]
-        own = np.array([_area(V, F) for V, F in parts])
+        own = np.array([normals_areas(V, F)[1].sum() for V, F in parts])
         return area * own / max(own.sum(), 1e-300)
 
     def _triangles(self, s):

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lib.elements.lattice import OFFSET
+from lib.visibility.hemisphere import cosine_direction_each
 from lib.visibility.tracer import Tracer
 
 PLACES = 256  # of a side: light that enters a crack along the border reaches too few to count
@@ -161,8 +162,6 @@ class _Room:
 
     def irradiance(self, x, N, rng):
         """One estimate of the irradiance at each of x (m, 3), on the side of N (m, 3): (m,)."""
-        from lib.visibility.hemisphere import cosine_direction_each  # 0.05 s that few scenes need
-
         H, weight, path = np.zeros(len(x)), np.ones(len(x)), np.arange(len(x))
         for bounce in range(BOUNCES + 1):
             # Add the lamps' light at the path's end.
