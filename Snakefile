@@ -1,7 +1,9 @@
 # From a scene folder to its bake: snakemake --cores 2 --config scene=FOLDER [SETTING=VALUE ...]
 # Rules read their slice of the settings as params, so that a changed setting re-runs the stages that read it and no others.
+import json
 import os
 import shlex
+import subprocess
 import sys
 import uuid
 
@@ -19,9 +21,25 @@ from snakemake.utils import min_version
 
 min_version("9.0")
 
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # jobs are the parallelism; idle threads cost start-up
+os.environ["PYTHONPATH"] = os.pathsep.join([workflow.basedir, *filter(None, [os.environ.get("PYTHONPATH")])])
+RUN = shlex.join([sys.executable, "-I", "-S", os.path.join(workflow.basedir, "stages")])  # stages/__main__.py
+
+
+def read_scene(folder, overrides, results_root):
+    """Read the scene in the process that runs the jobs: it needs the same libraries later, this one needs none."""
+    warm_start.start()
+    told = ["--scene", folder, "--overrides", json.dumps(overrides, default=str), "--results", results_root]
+    if subprocess.run([*shlex.split(RUN), "preflight", *told]).returncode:
+        sys.exit(1)
+
+
 try:
     scene = preflight.load(
-        config.get("scene", os.path.join(workflow.basedir, "data/scenes/fruit_room")), dict(config), "results"
+        config.get("scene", os.path.join(workflow.basedir, "data/scenes/fruit_room")),
+        dict(config),
+        "results",
+        read_scene,
     )
 except (Refusal, ArtefactError) as error:
     print(error, file=sys.stderr)
@@ -29,8 +47,6 @@ except (Refusal, ArtefactError) as error:
 for warning in scene.warnings:
     print(f"warning: {warning}", file=sys.stderr)
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # jobs are the parallelism; idle threads cost start-up
-os.environ["PYTHONPATH"] = os.pathsep.join([workflow.basedir, *filter(None, [os.environ.get("PYTHONPATH")])])
 os.environ.setdefault("BAKE_RUN", uuid.uuid4().hex)  # tells this run's costs from those of earlier ones
 os.environ["BAKE_SCENE"] = scene.file  # whose settings a job that refuses them names
 
@@ -40,7 +56,6 @@ envvars:  # goes with jobs to other machines
     "BAKE_SCENE",
 
 
-RUN = shlex.join([sys.executable, "-I", "-S", os.path.join(workflow.basedir, "stages")])  # stages/__main__.py
 OUT = f"results/{scene.name}"
 STAGE = f"{OUT}/stages"
 SLICES = rule_settings(scene.settings, scene.warnings, scene.tolerances, scene.reconstruction)

@@ -13,6 +13,7 @@ input, output and error.  The answer is the exit status as text.
 """
 
 import atexit
+import functools
 import gc
 import importlib
 import os
@@ -32,8 +33,9 @@ _HEAD = 8
 MOST_TOLD = 1 << 15  # bytes of names of modules: half of what a pipe holds
 
 
+@functools.cache
 def start():
-    """Start the process and put its address into the environment; it ends with this one.
+    """Start the process, once, and put its address into the environment; it ends with this one.
 
     Nothing is started, and jobs run by themselves, where the system has no process descriptors (Linux 5.3 and later has
     them) or no place for a socket: its path may hold 107 bytes.

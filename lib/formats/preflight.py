@@ -1,8 +1,8 @@
 """Everything a run must know before its first job: settings, names, files, averages; and every refusal of bad input.
 
-`load` is called while the Snakefile is parsed.  It imports the scene in full, so that each mistake is refused before a
-job starts, and writes slices of the settings into results/<scene>/settings/, named by their content: a rule that takes
-one as its input re-runs for what is in it and for nothing else.
+`load` is called while the Snakefile is parsed, `make` by it where something changed.  That imports the scene in full, so
+that each mistake is refused before a job starts, and writes slices of the settings into results/<scene>/settings/, named
+by their content: a rule that takes one as its input re-runs for what is in it and for nothing else.
 
     geometry-<hash>.json    what import_scene needs (see scene_import)
     materials-<hash>.json   {"rho_avg": {surface: [r, g, b]}}
@@ -19,6 +19,7 @@ import json
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 from lib.refusal import Refusal, refusal
 
@@ -72,27 +73,67 @@ class Preflight:
     warnings: list
 
 
-def load(folder, overrides=None, results_root="results"):
+def load(folder, overrides=None, results_root="results", make_elsewhere=None):
     """Check the scene in `folder` and return its Preflight.
 
     overrides : what was typed, nested or with dotted keys (the key `scene` is left out)
     results_root : folder of all results; this scene's is results_root/<name>
+    make_elsewhere : does what `make` does, with its arguments, where the libraries for it are at hand
 
     Raises Refusal, which lists every mistake, ArtefactError where results can not be written.
     """
     if folder in (None, ""):
         raise refusal("names no folder; expected scene=FOLDER", field="scene")
+    at = _place(folder, overrides, results_root)
+    _check_owner(at)
+    kept = _kept(at)
+    if kept is None:
+        (make_elsewhere or make)(str(folder), overrides, results_root)
+        kept = _kept(at)
+    if kept is None:
+        raise refusal("a file has changed while it was read; run again", file=at.given)
+    return Preflight(at.absolute, str(at.given / "scene.yaml"), at.home.name, **{field: kept[field] for field in _FIELDS})
+
+
+def make(folder, overrides=None, results_root="results"):
+    """Import the scene, write its slices and the outcome; arguments and what it raises as of `load`."""
+    from lib.formats import artefact, scene_check
+
+    at = _place(folder, overrides, results_root)
+    found = scene_check.run(at.given, at.overrides, at.home / "pictures")
+    here = {"folder": str(at.absolute), "file": found.file, "warnings": found.outcome["warnings"]}
+    slices, texts = {}, {at.home / "settings" / "folder.json": _text(here)}
+    for kind, content in found.slices.items():
+        text = _text(content)
+        path = at.home / "settings" / f"{kind}-{_digest(text)[:16]}.json"
+        slices[kind], texts[path] = path.as_posix(), text
+    for path, text in texts.items():
+        if not path.is_file() or path.read_bytes() != text:
+            with artefact.atomic(path) as file:
+                file.write(text)
+    written = {str(path): _digest(text) for path, text in texts.items()}
+    outcome = {**found.outcome, "slices": slices}
+    record = {"key": at.key, "folder": str(at.absolute), "inputs": found.inputs, "written": written, "outcome": outcome}
+    artefact.write_json(at.home / "preflight.json", record)
+
+
+class _Place(NamedTuple):
+    """Where a scene lies, as given and on this machine, where its results go, and what all of them come from."""
+
+    given: Path
+    absolute: Path
+    home: Path
+    overrides: dict
+    key: str
+
+
+def _place(folder, overrides, results_root):
     given = Path(str(folder))
     given = given.parent if given.name == "scene.yaml" else given
     absolute = Path(os.path.realpath(given))
-    name = _cleaned(absolute.name)
-    home = Path(results_root) / name
-    _check_owner(home, given, absolute)
-    key = _digest(json.dumps([VERSION, str(given), overrides or {}, _code()], sort_keys=True, default=str).encode())
-    kept = _kept(home / "preflight.json", key, absolute)
-    if kept is None:
-        kept = _make(given, overrides, home, key, absolute)
-    return Preflight(absolute, str(given / "scene.yaml"), name, **{field: kept[field] for field in _FIELDS})
+    overrides = json.loads(json.dumps(overrides or {}, default=str))  # the same for whoever is told them as text
+    key = _digest(json.dumps([VERSION, str(given), overrides, _code()], sort_keys=True).encode())
+    return _Place(given, absolute, Path(results_root) / _cleaned(absolute.name), overrides, key)
 
 
 def _cleaned(name):
@@ -101,14 +142,15 @@ def _cleaned(name):
     return cleaned(name)
 
 
-def _check_owner(home, given, absolute):
+def _check_owner(at):
     """Refuse results that belong to another folder, as long as that folder holds a scene."""
     try:
-        owner = json.loads((home / "settings" / "folder.json").read_text(encoding="utf-8"))["folder"]
+        owner = json.loads((at.home / "settings" / "folder.json").read_text(encoding="utf-8"))["folder"]
     except (OSError, ValueError, KeyError, TypeError):
         return
-    if owner != str(absolute) and (Path(owner) / "scene.yaml").exists():
-        raise refusal(f"{home} holds the bake of {owner}; rename one of the folders, or delete {home}", file=given)
+    if owner != str(at.absolute) and (Path(owner) / "scene.yaml").exists():
+        where = f"rename one of the folders, or delete {at.home}"
+        raise refusal(f"{at.home} holds the bake of {owner}; {where}", file=at.given)
 
 
 def _code():
@@ -120,39 +162,17 @@ def _code():
     return total.hexdigest()
 
 
-def _kept(path, key, absolute):
-    """The outcome kept in `path` if all it was made from is as it was, else None."""
+def _kept(at):
+    """The outcome kept from before if all it was made from is as it was, else None."""
     try:
-        kept = json.loads(path.read_text(encoding="utf-8"))
-        if kept["key"] != key or kept["folder"] != str(absolute):
+        kept = json.loads((at.home / "preflight.json").read_text(encoding="utf-8"))
+        if kept["key"] != at.key or kept["folder"] != str(at.absolute):
             return None
         unchanged = all(_digest_of(file) == digest for file, digest in kept["inputs"].items())
         whole = all(_digest_of(file) == digest for file, digest in kept["written"].items())
         return kept["outcome"] if unchanged and whole else None
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return None
-
-
-def _make(given, overrides, home, key, absolute):
-    """Import the scene, write its slices and the outcome."""
-    from lib.formats import artefact, scene_check
-
-    found = scene_check.run(given, overrides, home / "pictures")
-    here = {"folder": str(absolute), "file": found.file, "warnings": found.outcome["warnings"]}
-    slices, texts = {}, {home / "settings" / "folder.json": _text(here)}
-    for kind, content in found.slices.items():
-        text = _text(content)
-        path = home / "settings" / f"{kind}-{_digest(text)[:16]}.json"
-        slices[kind], texts[path] = path.as_posix(), text
-    for path, text in texts.items():
-        if not path.is_file() or path.read_bytes() != text:
-            with artefact.atomic(path) as file:
-                file.write(text)
-    written = {str(path): _digest(text) for path, text in texts.items()}
-    outcome = {**found.outcome, "slices": slices}
-    record = {"key": key, "folder": str(absolute), "inputs": found.inputs, "written": written, "outcome": outcome}
-    artefact.write_json(home / "preflight.json", record)
-    return json.loads(json.dumps(outcome))  # the same types as a second parse reads
 
 
 def _text(content):
@@ -168,4 +188,4 @@ def _digest_of(path):
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-__all__ = ["Preflight", "Refusal", "load"]
+__all__ = ["Preflight", "Refusal", "load", "make"]

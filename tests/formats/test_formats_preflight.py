@@ -1,5 +1,6 @@
 """Preflight: resolved settings, content-addressed slices that move only for what is in them, a quick second parse."""
 
+import datetime
 import json
 import os
 import shutil
@@ -222,3 +223,28 @@ def test_hostile_scenes_are_refused_within_two_seconds(home):
         with pytest.raises(Refusal, match="my room/scene.yaml: "):
             preflight.load("my room")
         assert time.monotonic() - start < 2
+
+
+def test_another_process_may_read_the_scene(home):
+    asked, overrides = [], {"bake": {"tolerance": 0.02}, "up": datetime.date(2026, 1, 2)}
+    with pytest.raises(Refusal, match="up: .*2026-01-02"):
+        preflight.load(home, overrides)
+    del overrides["up"]
+
+    def elsewhere(*arguments):
+        asked.append(json.loads(json.dumps(arguments)))
+        preflight.make(*asked[-1])
+
+    found = preflight.load(home, overrides, "results", elsewhere)
+    assert asked == [[str(home), overrides, "results"]]
+    assert found == preflight.load(home, overrides) and found.settings["bake"]["tolerance"] == 0.02
+    assert preflight.load(home, overrides, "results", elsewhere) == found and len(asked) == 1  # kept
+
+
+def test_a_file_that_changes_while_it_is_read_stops_the_run(home):
+    def elsewhere(*arguments):
+        preflight.make(*arguments)
+        edit(home, "units: cm\ngeometry", "units: mm\ngeometry")
+
+    with pytest.raises(Refusal, match="my room: a file has changed while it was read; run again"):
+        preflight.load(home, {}, "results", elsewhere)
