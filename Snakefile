@@ -60,8 +60,10 @@ OUT = f"results/{scene.name}"
 STAGE = f"{OUT}/stages"
 SLICES = rule_settings(scene.settings, scene.warnings, scene.tolerances, scene.reconstruction)
 SETTINGS = short(SLICES, f"{OUT}/settings")
-MAPPED = [f for f, role, black in zip(scene.files, scene.roles, scene.is_black) if role != "cast_only" and not black]
-N_CHUNKS = n_chunks(scene.settings, len(MAPPED), scene.mesh_cells)
+HAS_MAP = [role != "cast_only" and not black for role, black in zip(scene.roles, scene.is_black)]
+MAPPED = [file for file, has_map in zip(scene.files, HAS_MAP) if has_map]
+SIDES = [area**0.5 / scene.largest for area, has_map in zip(scene.area, HAS_MAP) if has_map]
+N_CHUNKS = n_chunks(scene.settings, SIDES, scene.mesh_cells)
 CHUNKS = range(N_CHUNKS)
 LODS = lod_levels(scene.settings["lods"])
 LEVELS = range(len(LODS))

@@ -1,7 +1,7 @@
 """What was read from a geometry file, kept so that the next to ask need not read it again.
 
 A scene is read while the Snakefile is parsed, and again by its first job.  A kept reading is found by the bytes of the
-file, how it was read, what lies in its folder, and the code that read it.
+file, how it was read, what lies in its folder but scene.yaml, which no reader opens, and the code that read it.
 """
 
 import hashlib
@@ -19,6 +19,7 @@ KIND, VERSION = "geometry", 2
 CODE = ("lib/formats", "lib/surfaces", "lib/nurbs")
 ROOT = Path(__file__).resolve().parents[2]
 MOST = 10_000  # files of a folder that are looked at
+SETTINGS = "scene.yaml"
 FACTS = ("number", "flip", "labels", "material", "solid", "shape", "area")
 KEPT = 16  # readings in one folder, the newest
 
@@ -31,11 +32,14 @@ def key(path, data, *how):
 
 
 def fingerprint(folder):
-    """Names, sizes and times of the files below a folder: [[relative path, bytes, ns], ...], results left out."""
+    """Names, sizes and times of the files below a folder: [[relative path, bytes, ns], ...], SETTINGS and results left
+    out.
+    """
     found, folder = [], Path(folder)
     for path in sorted(folder.rglob("*")):
         inside = path.relative_to(folder)
-        if "results" in inside.parts or any(part.startswith(".") for part in inside.parts) or not path.is_file():
+        is_hidden = any(part.startswith(".") for part in inside.parts)
+        if "results" in inside.parts or is_hidden or path.name == SETTINGS or not path.is_file():
             continue
         stat = path.stat()
         found.append([inside.as_posix(), stat.st_size, stat.st_mtime_ns])

@@ -23,11 +23,12 @@ from typing import NamedTuple
 
 from lib.refusal import Refusal, refusal
 
-VERSION = 6
+VERSION = 7
 ROOT = Path(__file__).resolve().parents[2]
 _FIELDS = (
     "settings", "names", "files", "roles", "is_black", "area", "groups", "tolerances", "reconstruction", "textures",
-    "rho_avg", "geometry_files", "texture_files", "emission_files", "has_meshes", "mesh_cells", "slices", "warnings",
+    "rho_avg", "geometry_files", "texture_files", "emission_files", "has_meshes", "mesh_cells", "largest", "slices",
+    "warnings",
 )  # fmt: skip
 
 
@@ -46,6 +47,7 @@ class Preflight:
     geometry_files, texture_files, emission_files : absolute paths; of pictures that shine, in both of the last
     has_meshes : some surfaces are triangle meshes
     mesh_cells : finest cells on the meshes, about
+    largest : side of the scene [m]
     slices : {"geometry" | "materials" | "textures": path}
     warnings : sentences for the user
     """
@@ -69,6 +71,7 @@ class Preflight:
     emission_files: list
     has_meshes: bool
     mesh_cells: int
+    largest: float
     slices: dict
     warnings: list
 

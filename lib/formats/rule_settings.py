@@ -5,12 +5,16 @@ import json
 import re
 from pathlib import Path
 
+import numpy as np
+
 from lib.formats.artefact import atomic
-from lib.radiosity.quality import quality
+from lib.radiosity.quality import first_level, quality
 
 RAYS_A_JOB = 24e6  # about 4 s of one core
 MOST_CHUNKS = 64
+SURFACE_RAYS = 8e4  # as many take as long as what a surface costs, however small
 MESH_RAYS = 8  # a finest cell of a mesh's map: some are sampled whatever the light
+MORE = 3  # samples in the end for one on the first lattices
 SHADOW_RAYS = 24  # a sample, of a few lights in view
 GATHER_RAYS = 0.1  # of a sample, an element of the coarse solution: roughly what a tolerance asks for with as many
 MOST_WARNINGS = 100  # told the report
@@ -103,9 +107,10 @@ def chosen_quality(bake):
     return q
 
 
-def n_chunks(settings, n_maps, mesh_cells=0):
+def n_chunks(settings, sides, mesh_cells=0):
     """Number of jobs the surfaces are shared among: asked for, or by the rays the scene will need.
 
+    sides : of the surfaces with maps, as if they were squares, in the scene's largest side
     mesh_cells : finest cells on all meshes, many of which are sampled whatever the light, along the borders of charts
     The tolerance does not count: a changed one must not sample again.
     """
@@ -113,7 +118,7 @@ def n_chunks(settings, n_maps, mesh_cells=0):
     if asked != "auto":
         return int(asked)
     q = chosen_quality(settings["bake"])
-    samples = n_maps * (2 ** q["base_direct"] + 1) ** 2
-    rays = 3 * samples * SHADOW_RAYS + 3 * n_maps * (2 ** q["base_indirect"] + 1) ** 2 * GATHER_RAYS * q["n_elements"]
-    rays += MESH_RAYS * mesh_cells
-    return int(min(MOST_CHUNKS, max(1, -(-rays // RAYS_A_JOB))))
+    crossings = [((2.0 ** first_level(sides, q[name]) + 1) ** 2).sum() for name in ("base_direct", "base_indirect")]
+    of_each = SHADOW_RAYS, GATHER_RAYS * q["n_elements"]
+    rays = len(sides) * SURFACE_RAYS + MORE * np.dot(crossings, of_each) + MESH_RAYS * mesh_cells
+    return int(np.clip(np.ceil(rays / RAYS_A_JOB), 1, MOST_CHUNKS))

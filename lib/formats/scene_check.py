@@ -95,6 +95,7 @@ def run(folder, overrides=None, pictures_folder=None):
             for one in placed
             if isinstance(one.surface, Mesh) and not table[one.name]["is_black"]
         ),
+        "largest": largest,
         "warnings": warnings,
     }
     slices = {

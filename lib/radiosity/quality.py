@@ -19,6 +19,7 @@ import numpy as np
 ELEMENTS = 8000  # lookups then bound the error near 0.2 % in a room with a teapot; `elements` asks for more
 LOOKUPS = 1.2e-3  # of the scene's mean light: error that the elements leave in bounced light, measured
 GATHER_RAYS = 720  # at a tolerance of 1 %
+LARGE = 0.25  # root cells from this side on, in the scene's largest side, start their trees in full
 
 
 @dataclass(frozen=True)
@@ -67,6 +68,13 @@ def quality(tolerance, max_level=8):
         top=max_level,
         smallest_cell=1e-3 * min(1.0, max(0.5, ratio / 0.8)),
     )
+
+
+def first_level(side, level):
+    """Level at which the tree of a flat surface begins, whose root cells have this side in the scene's largest: `level`
+    for large ones, at least 1; numbers or arrays.
+    """
+    return np.clip(level + np.round(np.log2(np.maximum(side, 1e-9) / LARGE)), 1, level).astype(np.int64)
 
 
 def _threshold(ratio):

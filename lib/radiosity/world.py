@@ -14,6 +14,7 @@ from lib.nurbs.coincident import back_to_back
 from lib.nurbs.evaluate import frame_grid
 from lib.nurbs.surface import NurbsSurface
 from lib.radiosity.emitters import facets_of_triangles, gather_emitters, simplified
+from lib.radiosity.quality import first_level
 from lib.surfaces import boxes
 from lib.surfaces.frames import domain_of, whole
 from lib.surfaces.measure import transformed
@@ -23,7 +24,6 @@ from lib.visibility.mesh_lookup import MeshLookup
 from lib.visibility.tracer import Tracer
 
 FINEST = 10  # positions are hashed on this level's lattice: a crossing draws the same rays at whatever level it is met
-LARGE = 0.25  # root cells from this side on, in the scene's largest side, start their trees in full
 APART = 2e-5  # in the frame: more than float32 rays err by, less than their origins are lifted
 PLACED = 8  # level of a trimmed surface's lattice whose cells say how dense its border is walked
 TURN = 0.6  # radians between normals of neighbouring base samples: beyond, light that depends on direction is missed
@@ -106,7 +106,7 @@ class World:
         """Level at which the trees of surface s begin: `level` on large surfaces, less on small ones as far as they
         are flat.
         """
-        least = int(np.clip(level + np.round(np.log2(self.side(s) / LARGE)), 1, level))
+        least = int(first_level(self.side(s), level))
         if self.casters.is_planar[s] or least == level or self.finest(s) is not None:
             return least
         h, w = self.lattices[s].shape(level)

@@ -39,6 +39,8 @@ def test_other_options_files_beside_it_and_code_are_read_anew(read, tmp_path, mo
     (tmp_path / "a.mtl").write_text("newmtl m\nKd 0 0 0.125\n")
     content, is_read = read()
     assert is_read and content.materials["m"]["reflectance"] == [0, 0, 0.125]
+    (tmp_path / "scene.yaml").write_text("lods: [0.5]")  # the settings are no part of a model
+    assert not read()[1]
     (tmp_path / "a.obj").write_text(SHEET.replace("f 2 4 3\n", ""))
     assert read()[1] and not read()[1]
     monkeypatch.setattr(geometry_cache, "_code", lambda: "another reader")

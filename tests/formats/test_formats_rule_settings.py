@@ -105,9 +105,11 @@ def test_long_slices_go_by_file(tmp_path):
 
 def test_chunks_follow_the_scene_and_not_the_tolerance():
     plain = settings()
-    assert n_chunks(plain, 0) == n_chunks(plain, 1) == 1
-    assert 1 < n_chunks(plain, 200) <= n_chunks(plain, 400) <= n_chunks(plain, 100_000) == MOST_CHUNKS
+    assert n_chunks(plain, []) == n_chunks(plain, [1]) == 1
+    walls, screws = [0.5] * 400, [0.001] * 400
+    assert 1 < n_chunks(plain, screws) < n_chunks(plain, walls) < n_chunks(plain, walls * 2)
+    assert n_chunks(plain, walls * 500) == MOST_CHUNKS
     for tolerance in (0.002, 0.009, 0.013, 0.1):
-        assert n_chunks(settings(bake__tolerance=tolerance), 200) == n_chunks(plain, 200)
-    assert n_chunks(settings(bake__chunks=7), 1) == 7
-    assert 1 < n_chunks(plain, 1, 3_000_000) < n_chunks(plain, 1, 30_000_000)
+        assert n_chunks(settings(bake__tolerance=tolerance), walls) == n_chunks(plain, walls)
+    assert n_chunks(settings(bake__chunks=7), [1]) == 7
+    assert 1 < n_chunks(plain, [1], 3_000_000) < n_chunks(plain, [1], 30_000_000)
