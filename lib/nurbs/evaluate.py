@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from lib.nurbs.surface_kernels import evaluate_points
+from lib.nurbs.surface_kernels import density_points, evaluate_points
 
 REMEMBERED = 8192  # numbers in the largest basis matrix that is kept
 DEGENERATE = 1e-10  # |S_u x S_v| below this share of the surface's own scale has no direction in float64
@@ -51,12 +51,23 @@ def _shift(a, left):
 
 def evaluate(surface, u, v):
     """Points and first derivatives at parameters u, v (m,) in [0, 1]: S, S_u, S_v, each (m, 3)."""
+    out = np.empty((3, np.broadcast(u, v).size, 3))
+    _at_points(evaluate_points, surface, u, v, out)
+    return out[0], out[1], out[2]
+
+
+def densities(surface, u, v):
+    """|S_u x S_v|, |S_u| and |S_v| at parameters u, v (m,) in [0, 1]: (m, 3)."""
+    out = np.empty((np.broadcast(u, v).size, 3))
+    _at_points(density_points, surface, u, v, out)
+    return out
+
+
+def _at_points(kernel, surface, u, v, out):
     u, v = np.broadcast_arrays(np.asarray(u, dtype=np.float64), np.asarray(v, dtype=np.float64))
     u, v, Pw = (np.ascontiguousarray(x) for x in (u, v, surface.Pw))
     p, q = surface.degree_u, surface.degree_v
-    out = np.empty((3, u.size, 3))
-    evaluate_points(surface.knots_u, surface.knots_v, Pw, p, q, u, v, np.empty((4, max(p, q) + 1)), out)
-    return out[0], out[1], out[2]
+    kernel(surface.knots_u, surface.knots_v, Pw, p, q, u, v, np.empty((4, max(p, q) + 1)), out)
 
 
 def _project(A, A_u, A_v):

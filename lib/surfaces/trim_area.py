@@ -10,7 +10,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from lib.nurbs.evaluate import evaluate, evaluate_grid
+from lib.nurbs.evaluate import densities
 from lib.surfaces.loops import following
 from lib.surfaces.trimmed import TrimmedSurface
 
@@ -36,7 +36,7 @@ def integrals(trim: TrimmedSurface):
     is_short = np.abs(B[:, 1] - A[:, 1]) < SHORT
     for n, own in ((2, is_short), (3, ~is_short)):
         total = total + _from_lines(trim.base, A[own], B[own], steps[0][cell[0][own]], ALONG[n])
-    return total
+    return np.append(total, (A[:, 0] + B[:, 0]) @ (B[:, 1] - A[:, 1]) / 2)
 
 
 def _steps(knots):
@@ -68,13 +68,13 @@ def _split(A, B, steps):
 
 
 def _up_to_lines(base, A, B, cell, steps):
-    """What the pieces A-B (k, 2) of loops, each in its `cell` (u, v), sweep up to the side of the cell: (4,)."""
+    """What the pieces A-B (k, 2) of loops, each in its `cell` (u, v), sweep up to the side of the cell: (3,)."""
     x, weight = (NODES[0] + 1) / 2, NODES[1] / 2
     width, height = (np.diff(t) for t in steps)
     u, v = ((t[:-1, None] + np.diff(t)[:, None] * x).ravel() for t in steps)
-    _, S_u, S_v = evaluate_grid(base, u, v)
-    swept = _densities(S_u, S_v).reshape(height.size, x.size, width.size, x.size, 4)
-    swept = np.cumsum(np.einsum("rqcpk,p,c->rqck", swept, weight, width), axis=2)
+    swept = densities(base, np.tile(u, v.size), np.repeat(v, u.size))
+    swept = weight @ swept.reshape(height.size, x.size, width.size, x.size, 3)
+    swept = np.cumsum(swept * width[:, None], axis=2)
     has_cells = cell[0] > 0
     column, row = cell[0][has_cells] - 1, cell[1][has_cells]
     start, end = (_antiderivatives((X[has_cells, 1] - steps[1][row]) / height[row]) for X in (A, B))
@@ -90,22 +90,15 @@ def _antiderivatives(t):
 
 
 def _from_lines(base, A, B, line, rule):
-    """What the pieces A-B (k, 2) sweep from u = line (k,): (4,)."""
+    """What the pieces A-B (k, 2) sweep from u = line (k,): (3,)."""
     along, dv = (rule[0] + 1) / 2, rule[1] / 2
     x, weight = (NODES[0] + 1) / 2, NODES[1] / 2
     at = A[:, None] + (B - A)[:, None] * along[:, None]
     rest = at[..., 0] - line[:, None]
     u = line[:, None, None] + rest[..., None] * x
     v = np.broadcast_to(at[..., 1:], u.shape)
-    _, S_u, S_v = evaluate(base, *(np.clip(t.ravel(), 0.0, 1.0) for t in (u, v)))
-    values = _densities(S_u, S_v).reshape(*u.shape, 4)
-    return np.einsum("nqpk,p,nq,q,n->k", values, weight, rest, dv, (B - A)[:, 1], optimize=True)
-
-
-def _densities(S_u, S_v):
-    """|S_u x S_v|, |S_u|, |S_v| and 1: (..., 4)."""
-    lengths = [np.linalg.norm(x, axis=-1) for x in (np.cross(S_u, S_v), S_u, S_v)]
-    return np.stack([*lengths, np.ones(S_u.shape[:-1])], axis=-1)
+    values = weight @ densities(base, *(np.clip(t.ravel(), 0.0, 1.0) for t in (u, v))).reshape(*u.shape, 3)
+    return (rest * dv * (B - A)[:, 1:]).ravel() @ values.reshape(-1, 3)
 
 
 def area(trim: TrimmedSurface):
