@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from lib.nurbs.evaluate import evaluate_grid
+from lib.nurbs.polyline_kernels import farthest
 
 SAMPLES = np.linspace(0.0, 1.0, 9)
 FINE = 8  # finer steps per sample, for curves that differ in speed
@@ -110,10 +111,9 @@ def same_curve(data, usable, known):
 
 def to_polyline(points, line):
     """The largest distance of `points` (m, 3) from the polyline `line` (k, 3)."""
-    start, along = line[:-1], np.diff(line, axis=0)
-    square = np.maximum(np.einsum("kc,kc->k", along, along), 1e-300)
-    t = np.clip(np.einsum("mkc,kc->mk", points[:, None] - start, along) / square, 0.0, 1.0)
-    return np.linalg.norm(points[:, None] - start - t[..., None] * along, axis=2).min(axis=1).max()
+    out = np.empty(1)
+    farthest(np.ascontiguousarray(points), np.ascontiguousarray(line), out)
+    return float(out[0])
 
 
 def shells(pairs, is_free, takes_part):
