@@ -20,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from lib.nurbs.evaluate import evaluate_grid
+from lib.nurbs.line_kernels import curvatures, turning
 
 CELLS = 64  # steps along the direction measured
 LEAST_CELLS = 8  # steps between two kinks, however near
@@ -110,7 +111,7 @@ def _along(kinks):
 def _grid(surface, d, along):
     """Points and derivatives with the measured direction first: (m + 1, 17, 3) each, S, along d, across d."""
     if d == 0:
-        S, S_u, S_v = (a.swapaxes(0, 1) for a in evaluate_grid(surface, along, ACROSS))
+        S, S_u, S_v = (np.ascontiguousarray(a.swapaxes(0, 1)) for a in evaluate_grid(surface, along, ACROSS))
         return S, S_u, S_v
     S, S_u, S_v = evaluate_grid(surface, ACROSS, along)
     return S, S_v, S_u
@@ -135,21 +136,9 @@ def unit(a):
 
 def _root_K(S, along, across, border, at, is_kink):
     """sqrt(K / 8) per step, normal and tangential (2, m): differences of S (m + 1, 17, 3) along its first axis."""
-    step = np.diff(at)[:, None, None]
-    slope = np.diff(S, axis=0) / step
-    second = 2 * np.diff(slope, axis=0) / (step[1:] + step[:-1])
-    normal = unit(np.cross(along, across))[1:-1]
-    out = np.abs(np.einsum("kic,kic->ki", second, normal))
-    inside = np.linalg.norm(second - np.einsum("kic,kic->ki", second, normal)[..., None] * normal, axis=2)
-    no_normal = ~normal.any(axis=2)
-    out[no_normal] = np.linalg.norm(second, axis=2)[no_normal]
-    tangent = unit(along)[1:-1]
-    for end, is_border in zip((0, -1), border, strict=True):
-        if is_border:  # the outline is geometry too: what leaves the side's own tangent counts in full
-            bend = second[:, end] - np.einsum("kc,kc->k", second[:, end], tangent[:, end])[:, None] * tangent[:, end]
-            out[:, end] = np.linalg.norm(bend, axis=1)
-    noise = 64 * np.finfo(float).eps * np.abs(S).max() / step[1:, 0, 0] ** 2
-    K = np.stack([out.max(axis=1), inside.max(axis=1)])
+    K = np.empty((2, len(at) - 2))
+    curvatures(S, along, across, at, *border, K)  # an outline is geometry too: all that leaves its tangent counts
+    noise = 64 * np.finfo(float).eps * np.abs(S).max() / np.diff(at)[1:] ** 2
     root = np.sqrt(np.where(K > noise, K, 0.0) / 8)
     # a difference across a kink is no curvature, and at the ends there is none: their steps take the other end's
     root = np.concatenate([np.zeros((2, 1)), np.where(is_kink[1:-1], 0.0, root), np.zeros((2, 1))], axis=1)
@@ -176,13 +165,9 @@ def _kinks(surface, d):
 
 def _turns(S):
     """Fewest steps by the turning of the curves S (m + 1, 17, 3) along the first axis: 1 to 3."""
-    chord = np.diff(S, axis=0)
-    length = np.linalg.norm(chord, axis=2)
-    rows = length.sum(axis=0) > 1e-6 * length.sum(axis=0).max(initial=0.0)
-    t = unit(chord[:, rows])
-    cosine = np.clip(np.einsum("kic,kic->ki", t[1:], t[:-1]), -1, 1)
-    angle = np.where(t[1:].any(axis=2) & t[:-1].any(axis=2), np.arccos(cosine), 0.0)
-    return int(np.clip(np.ceil(angle.sum(axis=0).max(initial=0.0) / TURN - 1e-6), 1, 3))
+    angle = np.empty(1)
+    turning(S, angle)
+    return int(np.clip(np.ceil(angle[0] / TURN - 1e-6), 1, 3))
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from lib.nurbs import lines
+from lib.surfaces.measure import transformed
 from tests.shapes import cylinder, rectangle, sphere
 
 NONE = np.empty((0, 5), dtype=int)
@@ -26,6 +27,13 @@ def test_steps_round_a_cylinder(tolerance):
 def test_a_circle_keeps_three_steps_however_coarse():
     p = planned(sphere(), (True, False), POLES)
     assert lines.per_surface(p, lines.steps(p, np.array([[1e6, 1e6]])))[0].tolist() == [3, 2]
+
+
+@pytest.mark.parametrize("turn", [np.eye(4), -np.eye(4), np.eye(4)[[1, 2, 0, 3]], -np.eye(4)[[2, 0, 1, 3]]])
+def test_straight_lines_do_not_turn_whichever_way_they_run(turn):
+    demand = lines.demand(transformed(cylinder(), np.vstack([turn[:3], np.eye(4)[3]])), (True, False), (False,) * 4)
+    assert demand.least.tolist() == [3, 1]
+    assert demand.root_K[1].max() < 1e-6 < 0.1 < demand.root_K[0].max()
 
 
 def test_steps_grow_with_the_root_of_the_tolerance():
