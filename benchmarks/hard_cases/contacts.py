@@ -2,8 +2,8 @@
 
 A room 1 wide and 1 high with a lamp below its ceiling and a bar that lies on the floor from wall to wall, once as long
 as wide and once LONG times that.  Direct light is known in closed form, all light by tracing paths (block_room.py).
-Irradiance is read from the final map, bilinearly; a texel is one of that map.  Cells along a contact are divided down to
-a share of the scene's largest side: the long room tells whether that is enough beside small things.
+Irradiance is read from the final map, bilinearly; a texel is one of that map.  Cells along a contact are divided down
+to a share of the scene's largest side: the long room tells whether that is enough beside small things.
 """
 
 import numpy as np

@@ -1,8 +1,8 @@
 """Everything a run must know before its first job: settings, names, files, averages; and every refusal of bad input.
 
-`load` is called while the Snakefile is parsed, `make` by it where something changed.  That imports the scene in full, so
-that each mistake is refused before a job starts, and writes slices of the settings into results/<scene>/settings/, named
-by their content: a rule that takes one as its input re-runs for what is in it and for nothing else.
+`load` is called while the Snakefile is parsed, `make` by it where something changed.  That imports the scene in full,
+so that each mistake is refused before a job starts, and writes slices of the settings into results/<scene>/settings/,
+named by their content: a rule that takes one as its input re-runs for what is in it and for nothing else.
 
     geometry-<hash>.json    what import_scene needs (see scene_import)
     materials-<hash>.json   {"rho_avg": {surface: [r, g, b]}}
@@ -95,7 +95,8 @@ def load(folder, overrides=None, results_root="results", make_elsewhere=None):
         kept = _kept(at)
     if kept is None:
         raise refusal("a file has changed while it was read; run again", file=at.given)
-    return Preflight(at.absolute, str(at.given / "scene.yaml"), at.home.name, **{field: kept[field] for field in _FIELDS})
+    file, fields = str(at.given / "scene.yaml"), {field: kept[field] for field in _FIELDS}
+    return Preflight(at.absolute, file, at.home.name, **fields)
 
 
 def make(folder, overrides=None, results_root="results"):

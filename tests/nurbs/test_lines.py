@@ -31,7 +31,7 @@ def test_a_circle_keeps_three_steps_however_coarse():
 
 @pytest.mark.parametrize("turn", [np.eye(4), -np.eye(4), np.eye(4)[[1, 2, 0, 3]], -np.eye(4)[[2, 0, 1, 3]]])
 def test_straight_lines_do_not_turn_whichever_way_they_run(turn):
-    demand = lines.demand(transformed(cylinder(), np.vstack([turn[:3], np.eye(4)[3]])), (True, False), (False,) * 4)
+    demand = lines.demand(transformed(cylinder(), np.vstack([turn[:3], np.eye(4)[3]])), (True, False), np.zeros(4, dtype=bool))
     assert demand.least.tolist() == [3, 1]
     assert demand.root_K[1].max() < 1e-6 < 0.1 < demand.root_K[0].max()
 
