@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from lib.surfaces.rows import numbered
 from lib.visibility.tracer import Tracer
 
 INSIDE = 1e-3  # in (u, v): samples keep this distance from the border, as far as the triangles are wide enough
@@ -32,12 +33,12 @@ class Places:
 
 class Domain:
     """Point location in the triangles uv (m, 3, 2) of a surface, chart (m,) int; cells : of its finest lattice along
-    (u, v)."""
+    (u, v); corner (m, 3) int : numbers of their corners, the same where place and chart are, if known."""
 
-    def __init__(self, uv, chart, cells):
+    def __init__(self, uv, chart, cells, corner=None):
         self.uv = np.asarray(uv, dtype=np.float64)
         self.chart = np.asarray(chart, dtype=np.int64)
-        self.cells = cells
+        self.cells, self._corner = cells, corner
         flat = np.concatenate([self.uv.reshape(-1, 2), np.zeros((3 * len(self.uv), 1))], axis=1)
         self._tracer = Tracer(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
 
@@ -49,14 +50,14 @@ class Domain:
     @cached_property
     def _is_border(self):
         """(m, 3) bool: the edge opposite to corner k of a triangle belongs to no other triangle of its chart."""
-        m = len(self.uv)
-        points = np.concatenate([self.uv.reshape(-1, 2), np.repeat(self.chart, 3)[:, None]], axis=1)
-        _, corner = np.unique(points, axis=0, return_inverse=True)
-        corner = corner.reshape(m, 3)
-        edge = np.stack([corner[:, [1, 2]], corner[:, [2, 0]], corner[:, [0, 1]]], axis=1)
-        edge = np.sort(edge.reshape(-1, 2), axis=1)
-        _, which, count = np.unique(edge, axis=0, return_inverse=True, return_counts=True)
-        return (count[which.ravel()] == 1).reshape(m, 3)
+        corner = self._corner
+        if corner is None:
+            points = np.concatenate([self.uv.reshape(-1, 2), np.repeat(self.chart, 3)[:, None]], axis=1)
+            corner = numbered(points)[0].reshape(-1, 3)
+        edge = np.stack([corner[:, [1, 2]], corner[:, [2, 0]], corner[:, [0, 1]]], axis=1).astype(np.int64)
+        edge = np.sort(edge, axis=2) @ [corner.max(initial=0) + 1, 1]
+        _, which, count = np.unique(edge, return_inverse=True, return_counts=True)
+        return (count == 1)[which].reshape(-1, 3)
 
     @cached_property
     def _border(self):

@@ -25,7 +25,7 @@ def domain_of(surface, cells):
         from lib.surfaces.trim_mesh import domain_triangles  # here: a scene without trims need not load it
 
         uv, F = domain_triangles(surface)
-        return Domain(uv[F], np.full(len(F), ONE_CHART), cells)
+        return Domain(uv[F], np.full(len(F), ONE_CHART), cells, F)
     return None
 
 
