@@ -3,9 +3,9 @@
 Starting an interpreter and importing numpy and a stage costs a job 0.15 to 0.25 CPU s, more than what most jobs of a
 small scene do; a fork costs 0.01 s.  `start` is called once by the Snakefile when a run begins; jobs reach the process
 through `stages/__main__.py`, which runs the stage by itself where there is no such process (on other machines, by
-hand).  A stage is loaded when its first job comes, before the fork; what that job found to load besides, such as
-scipy.spatial for trimmed surfaces, is loaded before the next of its kind.  No module starts a thread when it is loaded,
-which a fork would lose.
+hand).  A stage is loaded when its first job comes, before the fork; what two jobs found to load besides, such as
+scipy.spatial for trimmed surfaces, is loaded before the next of any kind.  No module starts a thread when it is
+loaded, which a fork would lose.
 
 A request is a message of 8 bytes, the length of what follows, and texts with a zero byte between them: working folder,
 number of arguments, stage, arguments, NAME=VALUE of the environment; with it come the file descriptors of standard
@@ -25,11 +25,13 @@ import subprocess
 import sys
 import tempfile
 import traceback
+from collections import Counter
 from contextlib import suppress
 from typing import NamedTuple
 
 VARIABLE = "BAKE_WARM"  # of the environment: where jobs find the address
 _HEAD = 8
+ENOUGH = 2  # jobs that had to load a module: another one will
 MOST_TOLD = 1 << 15  # bytes of names of modules: half of what a pipe holds
 
 
@@ -77,9 +79,8 @@ class Request(NamedTuple):
 
 
 class Child(NamedTuple):
-    """A job: its stage, process and the descriptor of that, and the end of a pipe that tells what it had to load."""
+    """A job: its process and the descriptor of that, and the end of a pipe that tells what it had to load."""
 
-    stage: str
     pid: int
     descriptor: int
     loaded: int
@@ -91,7 +92,7 @@ class Jobs:
     def __init__(self, listener):
         self._listener, self._events = listener, selectors.DefaultSelector()
         self._children = {}  # {connection: Child}
-        self._learned = {}  # {stage: modules that its last job had to load}
+        self._learned = Counter()  # {module: jobs that had to load it}
 
     def serve(self, lifeline):
         """Until the file `lifeline` is at its end; then the children are ended too."""
@@ -114,7 +115,7 @@ class Jobs:
     def _begin(self, connection):
         try:
             request, streams = _received(connection)
-            _load(f"stages.{request.stage}", *self._learned.pop(request.stage, ()))
+            _load(f"stages.{request.stage}", *(name for name, jobs in self._learned.items() if jobs >= ENOUGH))
             child = _forked(request, streams, [self._listener, connection, *self._children])
         except (OSError, ValueError):  # who asked has gone, or there is no room for a process: nothing is answered
             connection.close()
@@ -127,7 +128,7 @@ class Jobs:
         child = self._children.pop(connection)
         status = os.waitstatus_to_exitcode(os.waitpid(child.pid, 0)[1])
         with open(child.loaded) as file:
-            self._learned[child.stage] = file.read().split()
+            self._learned.update(set(file.read().split()))
         with suppress(KeyError):
             self._events.unregister(connection)
         self._events.unregister(child.descriptor)
@@ -166,7 +167,7 @@ def _forked(request, streams, sockets):
         _run(request, streams, sockets, tells)
     for descriptor in (*streams, tells):
         os.close(descriptor)
-    return Child(request.stage, pid, os.pidfd_open(pid), loaded)
+    return Child(pid, os.pidfd_open(pid), loaded)
 
 
 def _run(request, streams, sockets, tells):
