@@ -20,6 +20,7 @@ import platform
 import subprocess
 import sys
 from pathlib import Path
+from statistics import median
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
@@ -65,6 +66,21 @@ def ours(scene, tolerance, seed, args):
         "estimate": bake.artefact.read_json(results / "report.json")["totals"]["error"],
         **figures,
     }
+
+
+def starts(args):
+    """Rows of what the machine itself takes: a Snakemake run with nothing to do, and the import of open3d."""
+    empty = args.work / "empty"
+    empty.mkdir(parents=True, exist_ok=True)
+    (empty / "Snakefile").write_text('rule all:\n    shell: "true"\n')
+    commands = {
+        "empty Snakemake run": [sys.executable, "-m", "snakemake", "--cores", "1", "--quiet", "all"],
+        "import open3d": [sys.executable, "-c", "import open3d"],
+    }
+    return [
+        {"who": "machine", "scene": "", "setting": name, "cpu": median(measure.run(command, cwd=empty).cpu for _ in range(3))}
+        for name, command in commands.items()
+    ]
 
 
 def peer(script, scene, options, seed, args):
@@ -200,6 +216,7 @@ def main(argv=None):
     if "ours" in args.who:  # once unseen: the first run ever on a machine compiles the loops
         ours(args.scenes[0], max(args.tolerances), 0, args)
     for seed in range(1, args.repeat + 1):
+        rows += [{**row, "seed": seed} for row in starts(args)]
         for who, scene, setting, job in jobs:
             row = {"who": who, "scene": scene, "setting": setting, "seed": seed, **job(seed)}
             rows.append(row)
