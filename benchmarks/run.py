@@ -78,7 +78,12 @@ def starts(args):
         "import open3d": [sys.executable, "-c", "import open3d"],
     }
     return [
-        {"who": "machine", "scene": "", "setting": name, "cpu": median(measure.run(command, cwd=empty).cpu for _ in range(3))}
+        {
+            "who": "machine",
+            "scene": "",
+            "setting": name,
+            "cpu": median(measure.run(command, cwd=empty).cpu for _ in range(3)),
+        }
         for name, command in commands.items()
     ]
 
