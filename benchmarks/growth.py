@@ -127,7 +127,7 @@ AXES = {  # name: (what it counts, sizes, scene of a size)
     "triangles": (
         "triangles that cast shadows",
         (1e-3, 3e-4, 1e-4, 3e-5, 1e-5),
-        lambda sag: scene(room() + lamps(2) + balls(4), {**QUICK, "sag": sag}),
+        lambda sag: scene(room() + lamps(2) + balls(4, 0.75), {**QUICK, "sag": sag}),
     ),
     "lights": (
         "lamps",
@@ -141,8 +141,8 @@ AXES = {  # name: (what it counts, sizes, scene of a size)
     ),
     "elements": (
         "elements",
-        (300, 1000, 3000, 10000, 30000, 100000),
-        lambda n: scene(room() + lamps(2) + balls(4), {**QUICK, "elements": n}),
+        (100, 300, 1000, 3000, 10000, 30000, 100000, 300000),
+        lambda n: scene(room() + lamps(2) + tiles(30), {**QUICK, "elements": n}),
     ),
 }
 
