@@ -9,11 +9,12 @@ numba is there when it runs, and `_optimised` refuses what would need it.
 """
 
 import ctypes
+import fcntl
 import hashlib
 import os
 import sys
 import tempfile
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache, update_wrapper
 from pathlib import Path
 
@@ -105,20 +106,49 @@ def _host():
 
 
 def _object_code(module, target):
-    """Object file of a module's kernels: the one kept, or made anew."""
+    """Object file of a module's kernels: the one kept, or made anew, by one of all who ask at a time."""
     file = f"{Path(module.__file__).stem}.{_digest(module)}.o"
     folders = [Path(module.__file__).parent / "__pycache__", _user_cache()]
+    code = _kept(folders, file)
+    if code is not None:
+        return code
+    with _turn(folders):
+        code = _kept(folders, file)
+        if code is None:
+            code = _compile(module, target)
+            for folder in folders:
+                with suppress(OSError):
+                    _keep(folder / file, hashlib.sha256(code).digest() + code)
+                    break
+    return code
+
+
+def _kept(folders, file):
     for folder in folders:
         with suppress(OSError):
             text = (folder / file).read_bytes()
             if hashlib.sha256(text[32:]).digest() == text[:32]:
                 return text[32:]
-    code = _compile(module, target)
+    return None
+
+
+@contextmanager
+def _turn(folders):
+    """Wait until nobody else compiles into the first of the folders that can be had: jobs that start together need
+    the same code, which takes seconds.  Where the file system has no locks, each makes its own.
+    """
+    handle = None
     for folder in folders:
         with suppress(OSError):
-            _keep(folder / file, hashlib.sha256(code).digest() + code)
+            folder.mkdir(parents=True, exist_ok=True)
+            handle = os.open(folder, os.O_RDONLY)
+            fcntl.flock(handle, fcntl.LOCK_EX)
             break
-    return code
+    try:
+        yield
+    finally:
+        if handle is not None:
+            os.close(handle)
 
 
 def _user_cache():

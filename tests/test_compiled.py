@@ -111,6 +111,35 @@ def test_machine_code_is_kept_and_serves_without_numba(tmp_path):
     assert said.stdout.split() == ["6.0", "False"]
 
 
+def test_of_processes_that_start_together_one_compiles(tmp_path):
+    module_of(tmp_path)
+    lines = f"""
+import sys, time
+sys.path[:0] = [{str(tmp_path)!r}, {str(ROOT)!r}]
+import kernels_of_a_test, numpy
+from lib import compiled
+made = []
+def slowly(*args, compile=compiled._compile):
+    time.sleep(1)
+    made.append(args)
+    return compile(*args)
+compiled._compile = slowly
+print("ready", flush=True)
+input()
+kernels_of_a_test.sums(numpy.ones((1, 2), "f4"), numpy.ones(1, bool), 0.0, 1, numpy.ones(1))
+print(len(made))
+"""
+    pipe = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
+    both = [subprocess.Popen([sys.executable, "-c", lines], **pipe) for _ in range(2)]
+    for process in both:
+        assert process.stdout.readline() == "ready\n"
+    for process in both:
+        process.stdin.write("\n")
+        process.stdin.flush()
+    assert sorted(process.communicate()[0] for process in both) == ["0\n", "1\n"]
+    assert len(kept(tmp_path / "__pycache__")) == 1
+
+
 def test_a_damaged_file_is_made_anew(tmp_path):
     module_of(tmp_path).sums(*arguments())
     (path,) = (tmp_path / "__pycache__").glob("*.o")
