@@ -24,6 +24,9 @@ FROM_C = {"memcpy", "memmove", "memset", "sqrt", "sqrtf", "sin", "sinf", "cos", 
 NUMBERS = {"i8": ctypes.c_int64, "f8": ctypes.c_double, "f4": ctypes.c_float}  # arguments that are no array
 
 
+_modules, _ready = set(), set()  # names of modules with kernels; those that load_kept is done with
+
+
 class Kernel:
     """A compiled function; `__wrapped__` is the Python one.  Arrays must have the dtype, number of axes and C order
     of the signature: TypeError if not.  Returns an int.
@@ -34,10 +37,11 @@ class Kernel:
         self.types = [(text[:2], text.count(":")) for text in signature.replace(" ", "").replace(":,", ":").split(",")]
         self._dtypes = [np.dtype(code.replace("b1", "?")) for code, _ in self.types]
         self._entry = None
+        _modules.add(self.__module__)
 
     def __call__(self, *args):
         if self._entry is None:
-            self._entry = self._loaded()
+            self.load()
         values = []
         for arg, (code, axes), dtype in zip(args, self.types, self._dtypes, strict=True):
             if not axes:
@@ -49,7 +53,8 @@ class Kernel:
             values += (arg.__array_interface__["data"][0], *arg.shape)
         return self._entry(*values)
 
-    def _loaded(self):
+    def load(self):
+        """Make it ready, which else its first call does."""
         argtypes = []
         for code, axes in self.types:
             argtypes += [ctypes.c_void_p, *[ctypes.c_int64] * axes] if axes else [NUMBERS[code]]
@@ -57,7 +62,7 @@ class Kernel:
         address = self._engine.get_function_address(self.__name__)
         if not address:
             raise AttributeError(f"{self.__name__} is no kernel of {self.__module__} any more")
-        return ctypes.CFUNCTYPE(ctypes.c_int64, *argtypes)(address)
+        self._entry = ctypes.CFUNCTYPE(ctypes.c_int64, *argtypes)(address)
 
 
 def compiled(signature):
@@ -66,6 +71,18 @@ def compiled(signature):
     signature : a type for each argument, "f4[:, :], b1[:], i8": dtype, axes; an int, i8, is what all return
     """
     return lambda function: Kernel(function, signature)
+
+
+def load_kept():
+    """Load the kernels of all modules imported so far, of which there is machine code: forks of this process then need
+    not.
+    """
+    for name in sorted(_modules - _ready):
+        module = sys.modules.get(name)
+        if module is not None and _kept(*_places(module)) is not None:
+            _ready.add(name)
+            for kernel in _kernels(module):
+                kernel.load()
 
 
 def inlined(function):
@@ -107,8 +124,7 @@ def _host():
 
 def _object_code(module, target):
     """Object file of a module's kernels: the one kept, or made anew, by one of all who ask at a time."""
-    file = f"{Path(module.__file__).stem}.{_digest(module)}.o"
-    folders = [Path(module.__file__).parent / "__pycache__", _user_cache()]
+    folders, file = _places(module)
     code = _kept(folders, file)
     if code is not None:
         return code
@@ -121,6 +137,12 @@ def _object_code(module, target):
                     _keep(folder / file, hashlib.sha256(code).digest() + code)
                     break
     return code
+
+
+def _places(module):
+    """Folders where the object file of a module's kernels may lie, and its name."""
+    file = f"{Path(module.__file__).stem}.{_digest(module)}.o"
+    return [Path(module.__file__).parent / "__pycache__", _user_cache()], file
 
 
 def _kept(folders, file):

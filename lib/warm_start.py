@@ -152,9 +152,13 @@ def _received(connection):
 
 def _load(*modules):
     """Import what can be imported: the job will say what is wrong with the rest."""
+    from lib import compiled  # here: the reader of the Snakefile needs it not
+
     for name in modules:
         with suppress(Exception):
             importlib.import_module(name)
+    with suppress(Exception):
+        compiled.load_kept()
 
 
 def _forked(request, streams, sockets):

@@ -140,6 +140,18 @@ print(len(made))
     assert len(kept(tmp_path / "__pycache__")) == 1
 
 
+def test_what_is_kept_can_be_loaded_ahead_and_nothing_else(tmp_path, monkeypatch):
+    monkeypatch.setattr(compiled, "_ready", set(compiled._modules))
+    module = module_of(tmp_path)
+    compiled._ready.discard(module.__name__)
+    compiled.load_kept()
+    assert module.sums._entry is None and not kept(tmp_path / "__pycache__")
+    module.sums(*arguments())
+    again = module_of(tmp_path)
+    compiled.load_kept()
+    assert again.sums._entry is not None and again.sums(*arguments()) == 3
+
+
 def test_a_damaged_file_is_made_anew(tmp_path):
     module_of(tmp_path).sums(*arguments())
     (path,) = (tmp_path / "__pycache__").glob("*.o")
