@@ -20,7 +20,8 @@ from lib.formats.mistakes import listed
 from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch, is_selected
 from lib.maps.colour import linear_to_srgb
 from lib.nurbs.shape import transformed
-from lib.surfaces.trim_build import EdgeUse, significance, trimmed
+from lib.surfaces.significance import significance
+from lib.surfaces.trim_build import EdgeUse, trimmed
 
 if TYPE_CHECKING:  # never loaded here, but an edit there changes what this returns
     from lib.formats import step_faces  # noqa: F401

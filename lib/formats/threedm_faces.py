@@ -16,7 +16,8 @@ from lib.nurbs.evaluate import point
 from lib.nurbs.invert import Inverter
 from lib.nurbs.surface import NurbsSurface
 from lib.surfaces.loops import signed_area
-from lib.surfaces.trim_build import EdgeUse, significance, trimmed
+from lib.surfaces.significance import significance
+from lib.surfaces.trim_build import EdgeUse, trimmed
 
 CURVED = 9  # least points of an edge: straight in space may be bent in u, v
 ON_SIDE = 1e-5  # of the surface's size: an edge that stays so near a side lies on it

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lib.nurbs.evaluate import basis
+from lib.nurbs.curve_kernels import off_chords, points_on_curve
 
 MARGIN = 1.1  # more parts than the middle asks for, so that the next round finds little to mend
 ROUNDS = 4  # of cutting: the first counts the parts, the others mend where the curve bends unevenly
@@ -24,9 +24,10 @@ class NurbsCurve:
 
 def curve_points(curve, t):
     """Points (m, 3) at parameters t (m,) of the curve's own domain."""
-    k, N, _ = basis(curve.knots, curve.degree, len(curve.Pw), t)
-    A = np.einsum("ka,kac->kc", N, curve.Pw[k[:, None] + np.arange(-curve.degree, 1)])
-    return A[:, :3] / A[:, 3:]
+    knots, Pw, t = (np.ascontiguousarray(x, dtype=np.float64) for x in (curve.knots, curve.Pw, t))
+    S = np.empty((t.size, 3))
+    points_on_curve(knots, Pw, curve.degree, t, np.empty((2, curve.degree + 1)), S)
+    return S
 
 
 def polyline(curve, share=1e-5, least=2, most=500):
@@ -48,7 +49,8 @@ def polyline(curve, share=1e-5, least=2, most=500):
     within = share * max(float(np.ptp(S, axis=0).max()), 1e-300)
     # Cut every piece whose middle is off its chord: n parts are off by 1 / n^2 of it where the curve is a parabola
     for _ in range(ROUNDS if curve.degree > 1 else 0):
-        off = off_chord(curve_points(curve, (t[:-1] + t[1:]) / 2), S[:-1], S[1:])
+        off = np.empty(t.size - 1)
+        off_chords(curve_points(curve, (t[:-1] + t[1:]) / 2), S, off)
         parts = np.sqrt(off / within)
         if not (parts > 1).any():
             break
@@ -78,11 +80,3 @@ def _split(t, parts):
     piece = np.repeat(np.arange(t.size - 1), parts)
     step = np.arange(piece.size) - (np.cumsum(parts) - parts)[piece]
     return np.append(t[piece] + (t[piece + 1] - t[piece]) * (step / parts[piece]), t[-1])
-
-
-def off_chord(points, start, end):
-    """Distances (m,) of points (m, 3) from the segments start..end, each (m, 3)."""
-    along = end - start
-    square = np.einsum("kc,kc->k", along, along)
-    s = np.einsum("kc,kc->k", points - start, along) / np.where(square > 0, square, 1.0)
-    return np.linalg.norm(points - start - np.clip(s, 0.0, 1.0)[:, None] * along, axis=1)

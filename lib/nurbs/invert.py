@@ -7,13 +7,11 @@ on which side of a seam it lies, and the free parameter at a pole.
 
 import numpy as np
 
-from lib.nurbs.curve import off_chord
 from lib.nurbs.evaluate import evaluate, evaluate_grid
+from lib.nurbs.invert_kernels import descend, nearest_of_grid, stray
 from lib.nurbs.shape import collapsed_sides, sides, size
 
 MOST_LINES = 400  # grid lines in a direction
-MOST_STEPS = 60
-CONVERGED = 1e-12  # last step in space, of the surface's size
 NEAR = 1e-4  # of the size: a point nearer to the surface than this needs no other start
 POLE = 1e-5  # of the size: nearer to a pole the free parameter means nothing
 JUMP = 1e-3  # of the size: a step whose image in the surface leaves it by more is looked at again
@@ -47,11 +45,13 @@ class Inverter:
         for lines, ends in ((u, self.collapsed[:2]), (v, self.collapsed[2:])):
             for end in np.flatnonzero(ends):  # no step leads out of a pole
                 lines[-end] = (lines[-end] + lines[1 - 3 * end]) / 2
-        from scipy.spatial import cKDTree  # here: it takes 0.4 s to load, and whole surfaces need none
-
-        S = evaluate_grid(surface, u, v)[0]
-        self._grid = np.stack(np.meshgrid(u, v), axis=2).reshape(-1, 2)
-        self._tree = cKDTree(S.reshape(-1, 3))
+        S = np.ascontiguousarray(evaluate_grid(surface, u, v)[0])
+        self._grid, self._u, self._v = S, u, v
+        self._boxes = np.stack([S.min(axis=1), S.max(axis=1)], axis=1)
+        p, q = surface.degree_u, surface.degree_v
+        Pw = np.ascontiguousarray(surface.Pw)
+        self._kernel = surface.knots_u, surface.knots_v, Pw, p, q, int(self.closed[0]), int(self.closed[1])
+        self._scratch = np.empty((4, max(p, q) + 1)), np.empty((2, 3, 1, 3)), np.empty((2, 1))
 
     def polylines(self, lines):
         """[(uv (k, 2), distance (k,))] of each polyline of points (k, 3), k >= 1."""
@@ -66,59 +66,29 @@ class Inverter:
 
     def _nearest(self, points):
         """The best parameters of each point by itself."""
-        uv, distance = self._descend(points, self._grid[self._tree.query(points)[1]])
+        uv, distance = self._descend(points, self._starts(points, 1)[:, 0])
         off = np.flatnonzero(distance > NEAR * self.size)
         if off.size:
-            nearest = self._tree.query(points[off], min(STARTS, len(self._grid)))[1]
-            count = nearest.shape[1]
-            others, far = self._descend(np.repeat(points[off], count, axis=0), self._grid[nearest.ravel()])
+            starts = self._starts(points[off], min(STARTS, self._u.size * self._v.size))
+            count = starts.shape[1]
+            others, far = self._descend(np.repeat(points[off], count, axis=0), starts.reshape(-1, 2))
             best = far.reshape(-1, count).argmin(axis=1) + np.arange(off.size) * count
             better = far[best] < distance[off]
             uv[off[better]], distance[off[better]] = others[best[better]], far[best[better]]
         return uv, distance
 
+    def _starts(self, points, count):
+        """Parameters (k, count, 2) of the grid points nearest to each of points (k, 3)."""
+        found = np.empty((len(points), count), dtype=np.int64)
+        nearest_of_grid(self._grid, self._boxes, points, found, np.empty(found.shape))
+        row, column = np.divmod(found, self._u.size)
+        return np.stack([self._u[column], self._v[row]], axis=2)
+
     def _descend(self, points, uv):
         """Damped Gauss-Newton from uv (k, 2): new uv, and distances (k,)."""
-        uv = uv.copy()
-        S, S_u, S_v = evaluate(self.surface, uv[:, 0], uv[:, 1])
-        distance = np.linalg.norm(points - S, axis=1)
-        damping, left = np.full(len(points), 1e-6), np.arange(len(points))
-        for _ in range(MOST_STEPS):
-            if not left.size:
-                break
-            trial = self._step(points[left] - S[left], S_u[left], S_v[left], uv[left], damping[left])
-            new = evaluate(self.surface, *self._wrapped(trial).T)
-            far = np.linalg.norm(points[left] - new[0], axis=1)
-            moved = np.linalg.norm(new[0] - S[left], axis=1)
-            better = far < distance[left]
-            took = left[better]
-            uv[took], distance[took] = trial[better], far[better]
-            S[took], S_u[took], S_v[took] = (a[better] for a in new)
-            damping[left] = np.where(better, damping[left] / 10, damping[left] * 100)
-            done = (moved <= CONVERGED * self.size) | (damping[left] > 1e4)
-            left = left[~done]
-        return self._wrapped(uv), distance
-
-    def _step(self, r, S_u, S_v, uv, damping):
-        """Parameters after one damped step towards the points, inside the domain."""
-        a, b, c = (np.einsum("kc,kc->k", x, y) for x, y in ((S_u, S_u), (S_u, S_v), (S_v, S_v)))
-        g, h = np.einsum("kc,kc->k", S_u, r), np.einsum("kc,kc->k", S_v, r)
-        floor = 1e-30 * self.size**2
-        a, c = a * (1 + damping) + floor, c * (1 + damping) + floor
-        det = np.maximum(a * c - b * b, 1e-14 * a * c)
-        u, v = uv[:, 0] + (c * g - b * h) / det, uv[:, 1] + (a * h - b * g) / det
-        # Where one parameter is held at its end, the other is solved for alone
-        if not self.closed[0]:
-            held = np.clip(u, 0.0, 1.0)
-            v = np.where(held != u, uv[:, 1] + (h - b * (held - uv[:, 0])) / c, v)
-            u = held
-        if not self.closed[1]:
-            held = np.clip(v, 0.0, 1.0)
-            again = uv[:, 0] + (g - b * (held - uv[:, 1])) / a
-            u = np.where(held != v, again if self.closed[0] else np.clip(again, 0.0, 1.0), u)
-            v = held
-        limit = np.where(self.closed, 0.25, 1.0)
-        return uv + np.clip(np.stack([u, v], axis=1) - uv, -limit, limit)
+        uv, distance = uv.copy(), np.empty(len(points))
+        descend(*self._kernel, self.size, points, uv, distance, *self._scratch)
+        return uv, distance
 
     def _wrapped(self, uv):
         return np.where(self.closed, uv - np.floor(uv), uv)
@@ -156,10 +126,9 @@ class Inverter:
 
     def _stray(self, line, uv):
         """(k - 1,) how far the middle of each step in u, v lies from the step in space."""
-        step = np.diff(uv, axis=0)
-        step -= np.where(self.closed, np.round(step), 0.0)
-        middle = evaluate(self.surface, *self._wrapped(uv[:-1] + step / 2).T)[0]
-        return off_chord(middle, line[:-1], line[1:])
+        out = np.empty(len(line) - 1)
+        stray(*self._kernel, line, uv, *self._scratch, out)
+        return out
 
     def _at_poles(self, line, uv):
         """Points at a pole: on its side exactly, with the free parameter of the nearest point that has one."""

@@ -1,7 +1,4 @@
-"""Trimmed surfaces from loops of edges: closed in u, v, oriented, cropped to their box, every border point once.
-
-Source for the significance of points: Douglas, Peucker 1973, with the order of the splits kept in the numbers.
-"""
+"""Trimmed surfaces from loops of edges: closed in u, v, oriented, cropped to their box, every border point once."""
 
 from dataclasses import dataclass
 
@@ -24,7 +21,8 @@ class EdgeUse:
     """One edge as a face's border runs along it.
 
     uv : (k, 2) float64 in the surface's [0, 1] x [0, 1], k >= 2; along a closed direction it may go on over the seam
-    S : (k, 3) float64 positions, those of the edge;  significance : (k,) float64 of the edge, see `significance`
+    S : (k, 3) float64 positions, those of the edge;  significance : (k,) float64 of the edge, see
+        lib.surfaces.significance
     """
 
     uv: np.ndarray
@@ -34,55 +32,6 @@ class EdgeUse:
     def reversed(self):
         """The same edge in the other direction."""
         return EdgeUse(self.uv[::-1], self.S[::-1], self.significance[::-1])
-
-
-def significance(points):
-    """Tolerances (k,) up to which each point of a polyline (k, 3) is kept; inf at both ends.
-
-    The points with significance > t make a polyline within t of the whole one; which these are does not depend on the
-    direction.  A point's value is its distance from the chord at whose split it is the farthest, or that of the split
-    before it where this is less: the kept points of a larger t are among those of a smaller one.
-
-    >>> significance(np.array([[0, 0, 0], [1, 0, 0], [2, 1, 0], [4, 0, 0.0]])).round(3).tolist()
-    [inf, 0.447, 1.0, inf]
-    """
-    points = np.asarray(points, dtype=np.float64)
-    differs = np.flatnonzero((points != points[::-1]).any(axis=1))
-    if differs.size and tuple(points[differs[0]]) > tuple(points[-1 - differs[0]]):
-        return _significance(points[::-1])[::-1].copy()
-    return _significance(points)
-
-
-def _significance(points):
-    result = np.full(len(points), np.inf)
-    start, end, above = np.array([0]), np.array([len(points) - 1]), np.array([np.inf])
-    while True:
-        inner = end - start > 1
-        start, end, above = start[inner], end[inner], above[inner]
-        if not start.size:
-            return result
-        # Distances of all points of all open pieces from their chords, level by level
-        count = end - start - 1
-        first = np.cumsum(count) - count
-        piece = np.repeat(np.arange(start.size), count)
-        index = np.arange(count.sum()) - first[piece] + start[piece] + 1
-        far = _off(points[index], points[start[piece]], points[end[piece]])
-        most = np.maximum.reduceat(far, first)
-        hits = np.flatnonzero(far == most[piece])
-        split = index[hits[np.unique(piece[hits], return_index=True)[1]]]
-        value = np.minimum(most, above)
-        result[split] = value
-        start, end, above = np.append(start, split), np.append(split, end), np.append(value, value)
-
-
-def _off(points, start, end):
-    """Distances from segments, in an order of operations that does not depend on how many there are."""
-    along, to = end - start, points - start
-    square = along[:, 0] ** 2 + along[:, 1] ** 2 + along[:, 2] ** 2
-    s = to[:, 0] * along[:, 0] + to[:, 1] * along[:, 1] + to[:, 2] * along[:, 2]
-    s = np.clip(s / np.where(square > 0, square, 1.0), 0.0, 1.0)
-    d = to - s[:, None] * along
-    return np.sqrt(d[:, 0] ** 2 + d[:, 1] ** 2 + d[:, 2] ** 2)
 
 
 def trimmed(surface, loops):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from lib.nurbs.curve import NurbsCurve, curve_points, off_chord, polyline
+from lib.nurbs.curve import NurbsCurve, curve_points, polyline
+from lib.nurbs.curve_kernels import off_chords
 
 HALF = np.sqrt(0.5)
 SQUARE = np.array([[1, 0], [1, 1], [0, 1], [-1, 1], [-1, 0], [-1, -1], [0, -1], [1, -1], [1, 0.0]])
@@ -42,6 +43,7 @@ def test_the_number_of_points_is_bounded(most):
     assert len(polyline(wild, most=most)) <= most
 
 
-def test_distance_from_a_segment_counts_its_ends():
-    points = np.array([[0.5, 1, 0], [-1, 0, 0], [3, 4, 0.0]])
-    assert off_chord(points, np.zeros((3, 3)), np.array([[1, 0, 0], [1, 0, 0], [0, 0, 0.0]])).tolist() == [1, 1, 5]
+def test_distances_from_chords_count_their_ends():
+    points, out = np.array([[0.5, 1, 0], [1, 3, 4], [-1, 0, 0.0]]), np.empty(3)
+    off_chords(points, np.array([[0, 0, 0], [1, 0, 0], [1, 0, 0], [0, 0, 0.0]]), out)
+    assert out.tolist() == [1, 5, 1]

@@ -8,6 +8,7 @@ import pytest
 from lib.formats import geometry_file
 from lib.nurbs.evaluate import point
 from lib.nurbs.invert import Inverter, invert
+from lib.nurbs.invert_kernels import nearest_of_grid
 from lib.nurbs.shape import size
 from lib.nurbs.surface import from_points
 
@@ -90,3 +91,16 @@ def test_points_beside_the_surface_give_their_distance():
     [(uv, distance)] = inverter.polylines([np.column_stack([1.01 * np.cos(angle), 1.01 * np.sin(angle), 1 + 0 * T])])
     assert distance == pytest.approx(0.01, abs=1e-9)
     assert uv[:, 1] == pytest.approx(0.5, abs=1e-9)
+
+
+@pytest.mark.parametrize("count", [1, 8])
+def test_the_nearest_points_of_a_grid(count):
+    grid = np.stack(np.meshgrid(np.arange(5.0), np.arange(7.0), np.arange(1.0)), axis=3).reshape(7, 5, 3)
+    boxes = np.stack([grid.min(axis=1), grid.max(axis=1)], axis=1)
+    points = RNG.uniform(-2, 8, (100, 3))
+    points[0] = 0.5, 0.5, 0.0  # as far from four: those with the lowest numbers come first
+    found, square = np.empty((100, count), dtype=np.int64), np.empty((100, count))
+    nearest_of_grid(grid, boxes, points, found, square)
+    every = ((points[:, None] - grid.reshape(-1, 3)) ** 2).sum(axis=2)
+    assert np.array_equal(found, np.argsort(every, axis=1, kind="stable")[:, :count])
+    assert square == pytest.approx(np.sort(every, axis=1)[:, :count], rel=1e-12)
