@@ -1,5 +1,7 @@
 """What a surface is as a shape: closed, collapsed, planar, its area and extent, whatever its knots and weights."""
 
+from functools import lru_cache
+
 import numpy as np
 
 from lib.nurbs.evaluate import evaluate_grid
@@ -7,23 +9,29 @@ from lib.nurbs.surface import NurbsSurface
 
 SAME = 1e-9  # points closer than this share of the surface's size are one point
 PLANAR = 1e-7  # a surface within this share of its size of a plane is planar: float32 rays can not tell
+REMEMBERED = 4  # surfaces: what is done with a surface asks for its size and sides over and over
 SIDE_SAMPLES = np.linspace(0.0, 1.0, 17)
 GAUSS_CELLS, GAUSS_ORDER = 16, 4  # composite Gauss-Legendre between knots: 1e-9 on spheres
 GAUSS = np.polynomial.legendre.leggauss(GAUSS_ORDER)
 
 
+@lru_cache(maxsize=REMEMBERED)
 def size(surface):
     """The largest side of the bounding box of points on the surface."""
     S = evaluate_grid(surface, SIDE_SAMPLES, SIDE_SAMPLES)[0].reshape(-1, 3)
     return float(np.ptp(S, axis=0).max())
 
 
+@lru_cache(maxsize=REMEMBERED)
 def sides(surface):
     """Points along the sides u=0, u=1 (2, k, 3) and v=0, v=1 (2, m, 3), some in every span between knots."""
     ends = np.array([0.0, 1.0])
     along_v = evaluate_grid(surface, ends, _samples(surface.knots_v))[0]
     along_u = evaluate_grid(surface, _samples(surface.knots_u), ends)[0]
-    return np.moveaxis(along_v, 1, 0), along_u
+    both = np.moveaxis(along_v, 1, 0), along_u
+    for points in both:
+        points.flags.writeable = False  # they are remembered
+    return both
 
 
 def _samples(knots):
