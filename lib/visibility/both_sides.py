@@ -6,10 +6,12 @@ From each place of each side, on arrival and after every reflection, some points
 whether a side is dark.
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from lib.compiled import compiled
 from lib.elements.lattice import OFFSET
 from lib.visibility.hemisphere import cosine_direction_each
 from lib.visibility.tracer import Tracer
@@ -186,14 +188,50 @@ class _Room:
 
     def _direct(self, x, N, rng):
         """Irradiance at x from one point of the lamps, chosen by their power."""
-        lamps = self.lamps
-        k = np.minimum(np.searchsorted(lamps.share, rng.random(len(x)), side="right"), len(lamps.share) - 1)
-        D = _points(lamps.corner[k], rng) - x
-        r2 = np.einsum("ij,ij->i", D, D)
-        leaving, arriving = np.einsum("ij,ij->i", N, D), -np.einsum("ij,ij->i", lamps.normal[k], D)
-        H = np.zeros(len(x))
-        seen = np.flatnonzero((leaving > 0) & (arriving > 0))
-        seen = seen[~self.tracer.is_blocked(x[seen].astype(np.float32), D[seen].astype(np.float32))]
-        cosines = leaving[seen] * arriving[seen] / r2[seen]
-        H[seen] = lamps.power * cosines / (np.pi * r2[seen] + lamps.area[k[seen]])
+        n, lamps = len(x), self.lamps
+        chosen, place = rng.random(n), rng.random((2, n))
+        seen, arrives = np.empty(n, dtype=np.int64), np.empty(n)
+        origins, D = np.empty((2, n, 3), dtype=np.float32)
+        lamps = lamps.corner, lamps.normal, lamps.area, lamps.share, lamps.power
+        count = _towards_lamps(*lamps, x, N, chosen, place, seen, arrives, origins, D)
+        free = ~self.tracer.is_blocked(origins[:count], D[:count])
+        H = np.zeros(n)
+        H[seen[:count][free]] = arrives[:count][free]
         return H
+
+
+@compiled("f8[:,:,:], f8[:,:], f8[:], f8[:], f8, f8[:,:], f8[:,:], f8[:], f8[:,:], i8[:], f8[:], f4[:,:], f4[:,:]")
+def _towards_lamps(corner, normal, area, share, power, x, N, chosen, place, seen, H, origins, D):
+    """What each of x (m, 3) gets on the side of N (m, 3) from a point of the lamps, if nothing stands between.
+
+    corner, normal, area, share, power : as in _Lamps;  chosen (m,), place (2, m) : numbers of [0, 1) that choose the
+    triangle and the point of it
+    seen (m,), H (m,), origins, D (m, 3) : of those that face each other, one after the other, their numbers, irradiance
+    and ray to the lamp's point; returns how many
+    """
+    count = 0
+    for i in range(len(x)):
+        # The first triangle with share > chosen
+        k, high = 0, len(share) - 1
+        while k < high:
+            middle = (k + high) // 2
+            if share[middle] > chosen[i]:
+                high = middle
+            else:
+                k = middle + 1
+        a, b = place[0, i], place[1, i]
+        if a + b > 1:
+            a, b = 1 - a, 1 - b
+        px, py, pz = corner[k, 0, 0], corner[k, 0, 1], corner[k, 0, 2]
+        dx = px + a * (corner[k, 1, 0] - px) + b * (corner[k, 2, 0] - px) - x[i, 0]
+        dy = py + a * (corner[k, 1, 1] - py) + b * (corner[k, 2, 1] - py) - x[i, 1]
+        dz = pz + a * (corner[k, 1, 2] - pz) + b * (corner[k, 2, 2] - pz) - x[i, 2]
+        leaving = N[i, 0] * dx + N[i, 1] * dy + N[i, 2] * dz
+        arriving = -(normal[k, 0] * dx + normal[k, 1] * dy + normal[k, 2] * dz)
+        if leaving > 0 and arriving > 0:
+            r2 = dx * dx + dy * dy + dz * dz
+            seen[count], H[count] = i, power * (leaving * arriving / r2) / (math.pi * r2 + area[k])
+            origins[count, 0], origins[count, 1], origins[count, 2] = x[i, 0], x[i, 1], x[i, 2]
+            D[count, 0], D[count, 1], D[count, 2] = dx, dy, dz
+            count += 1
+    return count
