@@ -206,12 +206,9 @@ def nurbs_surface(surface):
     nurbs = surface if type(surface).__name__ == "NurbsSurface" else surface.ToNurbsSurface()
     if nurbs is None:
         raise ValueError("the surface has no NURBS form")
-    points = nurbs.Points
-    Pw = np.empty((points.CountU, points.CountV, 4))
-    for i in range(points.CountU):
-        for j in range(points.CountV):
-            at = points.GetControlPoint(i, j)
-            Pw[i, j] = at.X, at.Y, at.Z, at.W
+    points, (n_u, n_v) = nurbs.Points, (nurbs.Points.CountU, nurbs.Points.CountV)
+    at = [points.GetControlPoint(i, j) for i in range(n_u) for j in range(n_v)]
+    Pw = np.array([(p.X, p.Y, p.Z, p.W) for p in at]).reshape(n_u, n_v, 4)
     if not nurbs.IsRational:
         Pw[..., 3] = 1.0
     return NurbsSurface(nurbs.OrderU - 1, nurbs.OrderV - 1, _knots(nurbs.KnotsU), _knots(nurbs.KnotsV), Pw)

@@ -98,6 +98,8 @@ class Inverter:
         uv, distance = uv.copy(), distance.copy()
         for _ in range(MOST_ROUNDS if len(line) > 1 else 0):
             off = self._stray(line, uv)
+            if not off.max() > JUMP * self.size:  # as of most lines
+                break
             beside = 4 * np.median(distance)  # an edge that runs beside the surface strays by as much
             bad = np.flatnonzero(off > JUMP * self.size + beside)
             if not bad.size:
