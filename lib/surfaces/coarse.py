@@ -49,7 +49,8 @@ def _simplified(trim):
 def _divided(uv, F):
     """Each triangle in four, at the middles of its edges."""
     edge = np.sort(F[:, [[1, 2], [2, 0], [0, 1]]].reshape(-1, 2), axis=1)
-    edge, which = np.unique(edge, axis=0, return_inverse=True)
+    edge, which = np.unique(edge[:, 0] * len(uv) + edge[:, 1], return_inverse=True)  # far faster than rows
+    edge = np.stack(np.divmod(edge, len(uv)), axis=1)
     a, b, c = F.T
     x, y, z = (len(uv) + which.reshape(-1, 3)).T
     uv = np.concatenate([uv, uv[edge].mean(axis=1)])
