@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from lib.surfaces.nearest import Nearest
 from lib.surfaces.rows import numbered
 from lib.visibility.tracer import Tracer
 
@@ -96,7 +97,7 @@ class Domain:
         place = np.empty_like(uv)
         out = np.flatnonzero(~is_inside)
         if out.size:
-            nearest = self._tree.query(uv[out])[1]
+            nearest = self._nearest(uv[out])
             _, inner, owner = self._border
             place[out], face[out] = inner[nearest], owner[nearest]
         inside = np.flatnonzero(is_inside)
@@ -104,10 +105,8 @@ class Domain:
         return Places(place, face, self.chart[face], is_inside)
 
     @cached_property
-    def _tree(self):
-        from scipy.spatial import cKDTree  # here: it takes longer to load than most scenes to locate
-
-        return cKDTree(self._border[0])
+    def _nearest(self):
+        return Nearest(self._border[0])
 
     def face_at(self, uv):
         """(n,) triangle at each of uv (n, 2), -1 outside."""
@@ -120,7 +119,7 @@ class Domain:
         face = self.face_at(uv)
         out = np.flatnonzero(face < 0)
         if out.size:
-            face[out] = self._border[2][self._tree.query(uv[out])[1]]
+            face[out] = self._border[2][self._nearest(uv[out])]
         return self.chart[face]
 
     def coverage(self, rows, columns):
