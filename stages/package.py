@@ -45,7 +45,7 @@ def body(args, cost):
     asked = args.settings.get("exposure", "auto")
     if asked == "auto" and args.budget:
         asked = read_json(args.budget)["exposure"]
-    exposure = chosen_exposure(asked, textured_maps.reflected(maps), shapes.area[mapped])
+    exposure = chosen_exposure(asked, maps, shapes.area[mapped])
     extras = {"unit": "B_over_pi", "encoding": "srgb", "exposure": exposure}
     rho_avg, ways = read_json(args.materials)["rho_avg"], args.settings.get("reconstruction", {})
     looks = export.looks(x, shapes, maps, rho_avg, exposure, ways, levels, results)
@@ -79,9 +79,9 @@ def body(args, cost):
 
 
 def chosen_exposure(asked, maps, area):
-    """The exposure as a number: asked for, or by the light of a MapSet whose surfaces have `area` (m,)."""
+    """The exposure as a number: asked for, or by the light of TexturedMaps whose surfaces have `area` (m,)."""
     if asked == "auto":
-        return exposures.automatic(maps, area)
+        return exposures.automatic(textured_maps.reflected(maps), area)
     if isinstance(asked, bool) or not isinstance(asked, int | float) or not 0 < asked < np.inf:
         raise refusal(f"{asked!r}, allowed are auto or a number > 0", field="export: exposure")
     return float(asked)

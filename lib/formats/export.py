@@ -7,7 +7,7 @@ texture.
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cache, partial
 
 import numpy as np
 
@@ -34,7 +34,7 @@ def looks(x, shapes, maps, rho_avg, exposure, reconstruction, levels, results):
     shapes : Casters;  maps : TexturedMaps;  rho_avg : {name: (3,)};  levels : LodMeshes;  results : Path
     reconstruction : {name: "texture" or "gouraud"} of surfaces that ask for one, the rest is "auto"
     """
-    mean_B = display.mean_radiosity(textured_maps.reflected(maps), shapes.area[maps.final.surface])
+    mean_B = cache(lambda: display.mean_radiosity(textured_maps.reflected(maps), shapes.area[maps.final.surface]))
     lamps = _facets(levels[-1], np.flatnonzero(x.E.any(axis=1)), x.E)
     out = []
     for s, name in enumerate(x.names):
@@ -46,12 +46,12 @@ def looks(x, shapes, maps, rho_avg, exposure, reconstruction, levels, results):
             out.append(
                 Look(
                     gltf.Material(name),
-                    in_vertices=_estimated(rho_avg.get(name, GREY), x.E[s], lamps, mean_B, exposure),
+                    in_vertices=_estimated(rho_avg.get(name, GREY), x.E[s], lamps, mean_B(), exposure),
                 )
             )
             continue
         light = display.picture(maps.final.map(k), maps.final.hidden_map(k), maps.E[k], exposure)
-        if (light == light[0, 0]).all():
+        if (light[0] == light[0, 0]).all() and (light == light[0, 0]).all():
             out.append(Look(gltf.Material(name, colour=_clipped(light[0, 0]))))
         elif not isinstance(x.surfaces[s], Mesh) and _in_vertices(
             reconstruction.get(name, "auto"), light, [level.UV[_vertices(level, s)] for level in levels]
@@ -92,7 +92,8 @@ def _in_vertices(asked, light, vertices):
     if asked != "auto":
         return asked == "gouraud"
     h, w = light.shape[:2]
-    return gouraud.is_untwisted(light) and all(gouraud.holds_lattice(UV, w, h) for UV in vertices)
+    # The coarsest level, which comes last, has too few vertices for most maps: they are told apart without their light.
+    return all(gouraud.holds_lattice(UV, w, h) for UV in reversed(vertices)) and gouraud.is_untwisted(light)
 
 
 def _clipped(light):
