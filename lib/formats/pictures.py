@@ -15,11 +15,14 @@ from __future__ import annotations
 import os
 import stat
 import struct
+import zlib
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from lib.formats.artefact import ArtefactError, atomic
+from lib.maps import texel_kernels as kernels
 from lib.maps.colour import linear_to_srgb, srgb_to_linear
 from lib.refusal import Refusal
 
@@ -28,6 +31,12 @@ MAX_SIDE = 32768
 MAX_PIXELS = 1 << 26  # 8192 x 8192; 0.8 GB as float32 RGB
 ANY = float(np.finfo(np.float32).max)  # largest value of a picture that is no reflectance
 INTEGERS = {"uint8": np.uint8, "uint16": np.uint16}
+# How long to search for repetitions (zlib's level, OpenImageIO's own is 6) in a picture that a quick look shrinks to
+# this part at best.  Measured on baked textures: level 2 takes half the time or less for 0 to 3 % more bytes where
+# a photograph shows, level 4 a third for 5 %; on smooth light both would cost 10 to 35 % more.
+PNG_LEVELS = ((0.55, 2), (0.42, 4), (0.0, 6))
+PNG_LEVEL, SMALL = 6, 1 << 16  # the level of a picture of fewer bytes
+LOOKED_AT = 16  # of so many rows one
 
 
 @dataclass(frozen=True)
@@ -218,15 +227,20 @@ def _first_line(text):
 R2 = (0.7548776662466927, 0.5698402909980532)
 
 
-def dither(h, w):
-    """Return thresholds (h, w, 3) float32 in (0, 1): a fixed pattern without clumps, shifted by channel."""
+def _thresholds(h, w):
+    """What the thresholds of a fixed pattern without clumps are made of, shifted by channel: (h, 3), (w,) float32."""
     row = (0.5 + np.arange(h)[:, None] * R2[1] + np.arange(3) / 3) % 1
-    column = np.arange(w) * R2[0] % 1
-    t = row.astype(np.float32)[:, None] + column.astype(np.float32)[:, None]
-    t -= t >= 1
-    t *= np.float32(0.998)  # a value that is a code exactly must not fall to the next by rounding
-    t += np.float32(0.001)
-    return t
+    return row.astype(np.float32), (np.arange(w) * R2[0] % 1).astype(np.float32)
+
+
+@cache
+def _chords():
+    """The chords of 255 sRGB(x) that texel_kernels.codes takes for it, (a, b) of each: to 1e-5 of a code."""
+    first = np.int64(kernels.FIRST_PIECE)
+    x = ((first + np.arange(kernels.N_PIECES + 1)) << kernels.KEPT).astype(np.int32).view(np.float32).astype(np.float64)
+    y = 255 * np.where(x < 1, linear_to_srgb(x), 1)
+    b = np.diff(y) / np.diff(x)
+    return np.stack([y[:-1] - b * x[:-1], b], axis=1).astype(np.float32)
 
 
 def quantise_srgb(linear):
@@ -234,10 +248,26 @@ def quantise_srgb(linear):
 
     A value that is a code exactly keeps it; the mean of an even area is kept to about 1/100 of a code.
     """
-    h, w, _ = np.shape(linear)
-    scaled = linear_to_srgb(np.asarray(linear, np.float32))
+    linear = np.ascontiguousarray(linear, dtype=np.float32)
+    h, w, _ = linear.shape
+    row, column = _thresholds(h, w)
+    codes, unsure = np.empty(linear.shape, np.uint8), np.empty(linear.size, np.int64)
+    n = kernels.codes(linear, linear.view(np.int32), row, column, _chords(), codes, unsure)
+    # About one in a thousand lies so near to the next code that the curve itself has to say which it is.
+    some = unsure[:n]
+    texel, channel = np.divmod(some, 3)
+    codes.reshape(-1)[some] = _codes(linear.reshape(-1)[some], row[texel // w, channel] + column[texel % w])
+    return codes
+
+
+def _codes(linear, threshold):
+    """8-bit sRGB codes of linear light, rounded up from a threshold on; both float32, thresholds in [0, 2)."""
+    threshold -= threshold >= 1
+    threshold *= kernels.SHRUNK
+    threshold += kernels.RAISED
+    scaled = linear_to_srgb(linear)
     scaled *= 255
-    scaled += dither(h, w)
+    scaled += threshold
     return np.minimum(scaled, 255, out=scaled).astype(np.uint8)
 
 
@@ -254,7 +284,19 @@ def write_png8(path, codes):
     codes = np.asarray(codes)
     if codes.dtype != np.uint8:
         raise ValueError(f"codes: expected uint8, found {codes.dtype}")
-    _write(path, "png", codes.reshape(*codes.shape[:2], -1), "uint8", {"oiio:UnassociatedAlpha": 1})
+    codes = codes.reshape(*codes.shape[:2], -1)
+    _write(path, "png", codes, "uint8", {"oiio:UnassociatedAlpha": 1, "png:compressionLevel": _png_level(codes)})
+
+
+def _png_level(codes):
+    """zlib's level for codes (h, w, channels): noise is not worth a long search."""
+    if codes.size < SMALL:
+        return PNG_LEVEL
+    some = codes[::LOOKED_AT]
+    step = some.copy()
+    step[:, 1:] -= some[:, :-1]
+    part = len(zlib.compress(step.tobytes(), 1)) / step.size
+    return next(level for least, level in PNG_LEVELS if part >= least)
 
 
 def write_exr(path, linear, metadata=None):

@@ -12,15 +12,19 @@ def light(B, exposure):
 
 def picture(value, hidden, E, exposure):
     """Linear light (h, w, 3) of a map: reflected radiosity (h, w, 3), hidden samples filled, plus exitance E (3,)."""
-    return light(push_pull(value, hidden) + E, exposure)
+    shown = push_pull(value, hidden) + np.asarray(E, dtype=np.float64)
+    shown /= np.pi  # as `light` has it, in place: maps are large
+    shown *= exposure
+    return shown
 
 
 def mean_radiosity(maps, area):
     """Mean radiosity (3,) [W/m^2] by area of the visible samples of a MapSet whose surfaces have `area` (m,)."""
     total, weight = np.zeros(3), 0.0
     for k in range(len(maps)):
-        seen = ~maps.hidden_map(k)
-        if seen.any():
-            total += area[k] * maps.map(k)[seen].mean(axis=0, dtype=np.float64)
+        hidden = maps.hidden_map(k)
+        if not hidden.all():
+            seen = maps.map(k)[~hidden] if hidden.any() else maps.map(k).reshape(-1, 3)
+            total += area[k] * seen.mean(axis=0, dtype=np.float64)
             weight += area[k]
     return total / weight if weight else total

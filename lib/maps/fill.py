@@ -7,6 +7,8 @@ True = hidden.
 
 import numpy as np
 
+from lib.maps import texel_kernels as kernels
+
 NEIGHBOURS = [(-1, -1), (-1, 0), (-1, 1), (0, -1), (0, 1), (1, -1), (1, 0), (1, 1)]
 
 
@@ -48,7 +50,7 @@ def _ring(array, closed, outside=0):
 
 
 def push_pull(value, hidden):
-    """Return a copy of value with every hidden texel filled smoothly from the visible ones; 0 where none is visible.
+    """Return a copy of value (h, w, 3) with every hidden texel filled smoothly from the visible ones; 0 where none is.
 
     Push: halve the map, averaging visible texels, until one texel is left. Pull: fill what is empty from the level
     above, bilinearly. Visible texels keep their bits.  [Gortler et al. 1996, The Lumigraph]
@@ -57,40 +59,18 @@ def push_pull(value, hidden):
         return value.copy()
     if hidden.all():
         return np.zeros_like(value)
-    weight = (~hidden).astype(np.float64)
-    filled = _pull_up(np.where(_like(hidden, value), 0, value).astype(np.float64), weight)
-    return np.where(_like(hidden, value), filled, value).astype(value.dtype)
+    filled, weight = np.array(value, np.float64, order="C"), (~hidden).astype(np.float64)
+    return _filled(filled, weight).astype(value.dtype)
 
 
-def _pull_up(value, weight):
-    """Fill texels of weight 0 from a half-size map, recursively. value (h, w, ...), weight (h, w) in [0, 1]."""
+def _filled(value, weight):
+    """Fill texels of weight 0, in place, from a half-size map, recursively. value (h, w, 3); weight (h, w) <= 1."""
     h, w = weight.shape
-    if weight.min() > 0 or h * w == 1:
-        return value
-    coarse_weight = _quarter(weight)
-    coarse = _quarter(value * _like(weight, value))
-    full = coarse_weight > 0
-    coarse[full] /= _like(coarse_weight[full], coarse[full])
-    above = _pull_up(coarse, np.minimum(coarse_weight, 1))
-    rows, columns = (np.arange(n) / 2 - 0.25 for n in (h, w))  # fine texel centres in coarse texels
-    up = _linear(_linear(above, rows, 0), columns, 1)
-    return np.where(_like(weight > 0, value), value, up)
-
-
-def _quarter(array):
-    """Return sums over 2 x 2 blocks; an odd last row or column stands alone."""
-    h, w = array.shape[:2]
-    array = np.pad(array, [(0, h % 2), (0, w % 2)] + [(0, 0)] * (array.ndim - 2))
-    return array[0::2, 0::2] + array[1::2, 0::2] + array[0::2, 1::2] + array[1::2, 1::2]
-
-
-def _linear(array, at, axis):
-    """Interpolate linearly along axis at fractional indices `at`, clamped to the array."""
-    n = array.shape[axis]
-    at = np.clip(at, 0, n - 1)
-    low = np.minimum(at.astype(int), max(n - 2, 0))
-    t = (at - low).reshape([-1 if k == axis else 1 for k in range(array.ndim)])
-    return np.take(array, low, axis) * (1 - t) + np.take(array, np.minimum(low + 1, n - 1), axis) * t
+    if weight.min() == 0 and h * w > 1:
+        coarse, coarse_weight = np.empty(((h + 1) // 2, (w + 1) // 2, 3)), np.empty(((h + 1) // 2, (w + 1) // 2))
+        kernels.halve(value, weight, coarse, coarse_weight)
+        kernels.fill(_filled(coarse, coarse_weight), weight, value)
+    return value
 
 
 def _like(mask, value):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lib.formats import pictures
-from lib.maps.colour import srgb_to_linear
+from lib.maps.colour import linear_to_srgb, srgb_to_linear
 from lib.refusal import Refusal
 
 GREY, RGB, PALETTE, GREY_ALPHA, RGBA = 0, 2, 3, 4, 6  # PNG colour types
@@ -238,8 +238,6 @@ def test_dither_keeps_codes_and_the_mean_of_an_even_wall():
 def test_png_comes_back_to_half_a_code(tmp_path):
     value = np.linspace(0, 1, 64 * 3).reshape(4, 16, 3)
     pictures.write_png_srgb(tmp_path / "a.png", value)
-    from lib.maps.colour import linear_to_srgb
-
     assert np.abs(pictures.read_png8(tmp_path / "a.png") / 255 - linear_to_srgb(value)).max() <= CODE
     assert pictures.read_header(tmp_path / "a.png") == pictures.Header(16, 4, 3, False, False)
 
@@ -258,3 +256,25 @@ def test_nothing_is_left_where_writing_fails(tmp_path):
     with pytest.raises(ArtefactError, match="a.exr"):
         pictures.write_exr(tmp_path / "a.exr", np.zeros((2, 2, 3)))
     assert [p.name for p in tmp_path.iterdir()] == ["a.exr"]
+
+
+def test_codes_are_those_of_the_curve_itself():
+    """The chords of texel_kernels.codes only tell where a code is in no doubt: values near codes and others."""
+    rng = np.random.default_rng(5)
+    codes = srgb_to_linear(rng.integers(0, 256, (64, 128, 3)) / 255)
+    values = [rng.random(codes.shape), 10 ** rng.uniform(-6, 0.1, codes.shape), rng.uniform(0.003, 0.0033, codes.shape)]
+    row = (0.5 + np.arange(64)[:, None] * pictures.R2[1] + np.arange(3) / 3) % 1
+    column = np.arange(128) * pictures.R2[0] % 1
+    threshold = row.astype(np.float32)[:, None] + column.astype(np.float32)[:, None]
+    threshold = (threshold - (threshold >= 1)) * np.float32(0.998) + np.float32(0.001)
+    for value in [*values, codes, np.nextafter(codes.astype(np.float32), np.float32(0))]:
+        scaled = linear_to_srgb(value.astype(np.float32)) * 255 + threshold
+        assert np.array_equal(pictures.quantise_srgb(value), np.minimum(scaled, 255).astype(np.uint8))
+
+
+def test_only_noise_is_packed_in_a_hurry(tmp_path):
+    codes = np.repeat(np.linspace(0, 255, 256).astype(np.uint8), 3 * 128).reshape(256, 128, 3)
+    noise = np.random.default_rng(6).integers(0, 256, codes.shape, np.uint8)
+    assert [pictures._png_level(picture) for picture in (codes, noise, noise[:9])] == [6, 2, 6]
+    pictures.write_png8(tmp_path / "noise.png", noise)
+    assert np.array_equal(pictures.read_png8(tmp_path / "noise.png"), noise)
