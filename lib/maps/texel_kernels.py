@@ -1,4 +1,4 @@
-"""Compiled loops over the texels of maps: 8-bit codes of linear light, and the two halves of push and pull.
+"""Compiled loops over the texels of maps: 8-bit codes of linear light, the two halves of push and pull, brightness.
 
 Texels are (h, w, 3).  Every kernel writes into the arrays it is given last.
 """
@@ -13,6 +13,8 @@ KEPT = 23 - 10  # of the 23 bits of a float32's mantissa the upper ten choose a 
 FIRST_PIECE = int(np.float32(2.0**-9).view(np.int32)) >> KEPT  # 2^-9 < LINEAR_END
 N_PIECES = (int(WHOLE.view(np.int32)) >> KEPT) - FIRST_PIECE + 1  # the last one holds 1 alone
 UNSURE = np.float32(5e-4)  # of a code: above the error of `codes` and of the curve in float32, 2e-4 each at most
+BUCKET_BITS = 16  # of a float32 >= 0, as an integer in the same order
+DROPPED = 32 - BUCKET_BITS
 SHRUNK, RAISED = np.float32(0.998), np.float32(0.001)
 
 
@@ -99,3 +101,24 @@ def around(k, n):
     at = min(max(k / 2 - 0.25, 0.0), n - 1.0)
     low = min(int(at), max(n - 2, 0))
     return low, min(low + 1, n - 1), at - low
+
+
+@compiled("f4[:,:], i4[:,:], b1[:], i8[:], f8[:], f4[:], f8[:]")
+def brightest(value, bits, hidden, offsets, weight, top, share):
+    """The brightest channel of packed texels (N, 3), at least 0, -1 where hidden: top (N,).
+
+    bits : the same memory as `value`;  offsets (m + 1,), weight (m,) : of the maps, as MapSet has them
+    share : starts at 0; the weights of the texels are added up by the upper BUCKET_BITS of their `top`
+    """
+    for k in range(len(weight)):
+        for n in range(offsets[k], offsets[k + 1]):
+            top[n] = -WHOLE
+            if hidden[n]:
+                continue
+            here, of = NONE, np.int32(0)
+            for c in range(3):
+                if value[n, c] > here:
+                    here, of = value[n, c], bits[n, c]
+            top[n] = here
+            share[of >> DROPPED] += weight[k]
+    return 0

@@ -67,3 +67,13 @@ def test_exposure_weighs_samples_by_area():
     maps = mapset.pack([0, 1], [[1, 1]] * 2, [2, 0], [np.full((5, 5, 3), np.pi), np.full((2, 2, 3), 8 * np.pi)])
     assert exposure.automatic(maps, np.array([99.5, 0.5])) == pytest.approx(1.0)
     assert exposure.automatic(maps, np.array([98.0, 2.0])) == pytest.approx(1 / 8)
+
+
+def test_exposure_is_that_of_all_samples_in_order():
+    rng = np.random.default_rng(8)
+    maps = mapset.pack([0, 1], [[3, 2], [1, 1]], [4, 5], [rng.random((33, 49, 3)), 2 * rng.random((33, 33, 3))])
+    weight = np.repeat([3.0 / 33 / 49, 1.0 / 33 / 33], [33 * 49, 33 * 33])
+    top = maps.value.max(axis=1)
+    order = np.argsort(top)
+    at = np.searchsorted(np.cumsum(weight[order]), 0.99 * weight.sum())
+    assert exposure.automatic(maps, np.array([3.0, 1.0])) == pytest.approx(np.pi / top[order[at]], rel=1e-12)
