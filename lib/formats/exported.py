@@ -29,7 +29,8 @@ WRAP = {33071: "clamp", 10497: "repeat", 33648: "mirror"}
 def load(path, known=None):
     """(list of Part, list of Texture) of a .gltf or .glb file. Raises ArtefactError naming the file and the fault.
 
-    known : {picture file: linear rgb} of files read before, added to; levels that name the same pictures read them once
+    known : {picture file: its texels and their light} of files read before, added to; levels that name the same
+        pictures read them once
     """
     path, known = Path(path), {} if known is None else known
     try:
@@ -167,18 +168,18 @@ def _texture(document, buffers, path, texture, known):
     if "uri" in image and not image["uri"].startswith("data:"):
         file = path.parent / unquote(image["uri"])
         if file not in known:
-            known[file] = pictures.read_linear(file)
-        rgb = known[file]
+            known[file] = pictures.read_codes(file)
+        texels, light = known[file]
     else:
         data = _bytes(path, image["uri"]) if "uri" in image else _view(document, buffers, image["bufferView"])[0]
         handle, name = tempfile.mkstemp(suffix=".jpg" if data[:2] == b"\xff\xd8" else ".png")
         try:
             with os.fdopen(handle, "wb") as file:
                 file.write(data)
-            rgb = pictures.read_linear(name)
+            texels, light = pictures.read_codes(name)
         finally:
             os.unlink(name)
-    return Texture(rgb, wrap)
+    return Texture(texels, wrap, light)
 
 
 def inlined(path, largest=1 << 27):

@@ -86,6 +86,16 @@ def read_linear(path, colour_space="srgb", warn=None, most=1.0):
 
     Raises Refusal as read_header does, and for damaged pixels or a texel that is negative, above `most` or NaN.
     """
+    texels, light = read_codes(path, colour_space, warn, most)
+    return texels if light is None else light[texels]
+
+
+def read_codes(path, colour_space="srgb", warn=None, most=1.0):
+    """Read a texture as stored: (texels (h, w, 3), light), row 0 = top.
+
+    Integer codes, and the linear light of each as `light` (k,) float32; or linear float32, and None. Arguments and
+    refusals are those of read_linear.
+    """
     if colour_space not in COLOUR_SPACES:
         raise Refusal(f"{path}: colour_space: {colour_space!r}, allowed are {' and '.join(COLOUR_SPACES)}")
     source, spec = _open(path)
@@ -104,18 +114,20 @@ def read_linear(path, colour_space="srgb", warn=None, most=1.0):
     if kind not in INTEGERS and colour_space == "srgb" and warn is not None:
         warn(f"{path}: holds floating point values, taken as linear")
 
-    colour = _upright(pixels[..., _colour_channels(spec)], _orientation(spec))
+    channels = _colour_channels(spec)
+    colour = pixels if channels == list(range(spec.nchannels)) else pixels[..., channels]
+    colour = np.ascontiguousarray(_upright(colour, _orientation(spec)))
     if kind in INTEGERS:
-        return np.ascontiguousarray(_decode(colour, colour_space))
+        return colour, _light(colour.dtype, colour_space)
     _check_values(path, colour, most)
-    return np.ascontiguousarray(colour, dtype=np.float32)
+    return np.ascontiguousarray(colour, dtype=np.float32), None
 
 
-def _decode(codes, colour_space):
-    """Decode integer codes to linear float32 by a table with one entry a code."""
-    top = np.iinfo(codes.dtype).max
+def _light(dtype, colour_space):
+    """Linear light of every code of an integer type, a table (k,) float32."""
+    top = np.iinfo(dtype).max
     table = np.arange(top + 1) / top
-    return (srgb_to_linear(table) if colour_space == "srgb" else table).astype(np.float32)[codes]
+    return (srgb_to_linear(table) if colour_space == "srgb" else table).astype(np.float32)
 
 
 def _check_values(path, colour, most):
@@ -281,11 +293,25 @@ def write_png_srgb(path, linear):
 
 def write_png8(path, codes):
     """Write uint8 codes (h, w), (h, w, 1), (h, w, 3) or (h, w, 4) as a PNG, row 0 = top. Raises ArtefactError."""
+    _write(path, "png", *_png(codes))
+
+
+def png_bytes(codes):
+    """The bytes of the PNG that write_png8 writes, made in memory."""
+    with os.fdopen(os.memfd_create("png"), "rb") as file:
+        fault = _encode(f"/proc/self/fd/{file.fileno()}", "png", *_png(codes))
+        if fault:
+            raise ArtefactError(f"picture: can not be written: {fault}")
+        return file.read()
+
+
+def _png(codes):
+    """Pixels, type and attributes of a PNG."""
     codes = np.asarray(codes)
     if codes.dtype != np.uint8:
         raise ValueError(f"codes: expected uint8, found {codes.dtype}")
     codes = codes.reshape(*codes.shape[:2], -1)
-    _write(path, "png", codes, "uint8", {"oiio:UnassociatedAlpha": 1, "png:compressionLevel": _png_level(codes)})
+    return codes, "uint8", {"oiio:UnassociatedAlpha": 1, "png:compressionLevel": _png_level(codes)}
 
 
 def _png_level(codes):
@@ -312,21 +338,27 @@ def write_exr(path, linear, metadata=None):
 
 
 def _write(path, extension, pixels, kind, attributes):
+    with atomic(path) as file:
+        fault = _encode(file.name, extension, pixels, kind, attributes)
+        if fault:
+            raise ArtefactError(f"{path}: can not be written: {fault}")
+
+
+def _encode(name, extension, pixels, kind, attributes):
+    """Write a picture into a file of any name: why that failed, "" if it did not."""
     h, w, channels = pixels.shape
     oiio = _openimageio()
     spec = oiio.ImageSpec(w, h, channels, kind)
-    for name, value in attributes.items():
+    for key, value in attributes.items():
         if isinstance(value, str | int | float):
-            spec.attribute(name, value)
+            spec.attribute(key, value)
         else:
             numbers = tuple(float(x) for x in value)
-            spec.attribute(name, f"float[{len(numbers)}]", numbers)
-    with atomic(path) as file:
-        out = oiio.ImageOutput.create(f"x.{extension}")
-        done = out.open(file.name, spec) and out.write_image(np.ascontiguousarray(pixels))
-        done = out.close() and done
-        if not done:
-            raise ArtefactError(f"{path}: can not be written: {_first_line(out.geterror()) or 'disk full?'}")
+            spec.attribute(key, f"float[{len(numbers)}]", numbers)
+    out = oiio.ImageOutput.create(f"x.{extension}")
+    done = out.open(name, spec) and out.write_image(np.ascontiguousarray(pixels))
+    done = out.close() and done
+    return "" if done else _first_line(out.geterror()) or "disk full?"
 
 
 def read_exr(path):

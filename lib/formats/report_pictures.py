@@ -1,9 +1,5 @@
 """The pictures of the report: the exported levels, drawn; the maps, small; and what the viewer needs."""
 
-import tempfile
-from functools import partial
-from pathlib import Path
-
 import numpy as np
 
 from lib.formats import exported, pictures
@@ -19,21 +15,20 @@ MOST_THUMBNAILS = 160
 def draw(bake, facts, settings):
     """Pictures of the levels and maps, and what the viewer shows (None where that is too large to inline)."""
     known, inlined, levels, hero, view, near = {}, [], [], None, None, None
-    with tempfile.TemporaryDirectory() as folder:
-        png = partial(_png, Path(folder) / "x.png")
-        for level in facts["levels"]:
-            path = bake.folder / level["file"]
-            parts, textures = exported.load(path, known)
-            model = picture.join(parts)
-            if view is None:
-                given = settings.get("camera")
-                view = scene_camera(given, settings) if given else cameras.automatic(model)
-                near = cameras.closer(model, view, *SMALL)
-                hero = png(picture.render(model, textures, view, *HERO))
-            levels.append(tuple(png(shot) for shot in picture.render_with_edges(model, textures, near, *SMALL)))
-            inlined.append(exported.inlined(path))
-        place = {"eye": [float(x) for x in view.eye], "target": [float(x) for x in view.target], "fov": float(view.fov)}
-        drawn = Pictures(hero, levels, map_thumbnails(bake, facts, png), place)
+    for level in facts["levels"]:
+        path = bake.folder / level["file"]
+        parts, textures = exported.load(path, known)
+        model = picture.join(parts)
+        if view is None:
+            given = settings.get("camera")
+            view = scene_camera(given, settings) if given else cameras.automatic(model)
+            near = cameras.closer(model, view, *SMALL)
+            hero = pictures.png_bytes(picture.render(model, textures, view, *HERO))
+        shots = picture.render_with_edges(model, textures, near, *SMALL)
+        levels.append(tuple(pictures.png_bytes(shot) for shot in shots))
+        inlined.append(exported.inlined(path))
+    place = {"eye": [float(x) for x in view.eye], "target": [float(x) for x in view.target], "fov": float(view.fov)}
+    drawn = Pictures(hero, levels, map_thumbnails(bake, facts), place)
     return drawn, None if None in inlined else _viewer_model(inlined, place)
 
 
@@ -57,8 +52,8 @@ def scene_camera(given, settings):
     return cameras.Camera(place(given["eye"]), place(given["target"]), float(given.get("fov", 50)))
 
 
-def map_thumbnails(bake, facts, png):
-    """{name: Thumbnail} of the largest maps of light; png(codes) gives PNG bytes."""
+def map_thumbnails(bake, facts):
+    """{name: Thumbnail} of the largest maps of light."""
     if bake.textures is None:
         return {}
     light = bake.textures.light
@@ -77,11 +72,5 @@ def map_thumbnails(bake, facts, png):
             path, cells_w, cells_h = charts.tree_lines(
                 *(np.concatenate(x) for x in zip(*(surfaces.leaves(t) for t in own), strict=True)), roots
             )
-        drawn[bake.scene.names[s]] = Thumbnail(png(codes), codes.shape[1::-1], path, cells_w, cells_h)
+        drawn[bake.scene.names[s]] = Thumbnail(pictures.png_bytes(codes), codes.shape[1::-1], path, cells_w, cells_h)
     return drawn
-
-
-def _png(path, codes):
-    """PNG bytes of 8-bit codes (h, w, 3), by way of a file: OpenImageIO's Python writes to nothing else."""
-    pictures.write_png8(path, codes)
-    return path.read_bytes()

@@ -211,12 +211,12 @@ def level_rows(lods):
     return rows
 
 
-def exported_seams(bake, maps, mean_H):
+def exported_seams(bake, maps, mean_H, normals):
     """The same as the seams of the maps, of the exported ones: within the budget, which treats neighbours apart."""
     if maps is None:
         return []
     H = seams.exported_irradiance(maps, bake.textures.rho_avg, bake.textures.textured)
-    return seams.rows(bake.scene, bake.casters, H, mean_H)
+    return seams.rows(bake.scene, bake.casters, H, mean_H, normals)
 
 
 def counted(bake, rows):
@@ -248,6 +248,7 @@ def collect(name, bake, settings, run):
     rows = surfaces.rows(scene, bake.trees, bake.maps, exported_maps, D_i, mean_H, ways)
     for row, extent in zip(rows, bake.casters.extent, strict=True):
         row["aspect"] = float(extent[0] / extent[1]) if extent[1] > 0 else None
+    normals = {}  # along borders, which both kinds of seams ask for
     stages = stage_costs(bake.costs, run)
     levels = level_rows(bake.lods)
     history = solution.history if solution is not None and len(solution.history) else np.zeros((0, 2))
@@ -279,8 +280,8 @@ def collect(name, bake, settings, run):
         "gouraud": gouraud([row["leaves"] for row in rows], levels),
         "savings": savings(counted(bake, rows)),
         "notes": notes(bake.costs),
-        "seams": seams.rows(bake.scene, bake.casters, bake.maps, mean_H),
-        "seams_exported": exported_seams(bake, exported_maps, mean_H),
+        "seams": seams.rows(bake.scene, bake.casters, bake.maps, mean_H, normals),
+        "seams_exported": exported_seams(bake, exported_maps, mean_H, normals),
         "exposure": bake.lods.get("exposure"),
         "settings": settings.get("settings"),
         "warnings": list(dict.fromkeys([*scene.warnings, *settings.get("warnings", [])])),

@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from lib.maps.colour import linear_to_srgb, srgb_to_linear
+from lib.report import rays, shading_kernels
 from lib.surfaces.rows import numbered
-from lib.visibility import closest
 
 RAYS_AT_ONCE = 1 << 17
 THROUGH = 12  # culled faces a ray may pass before it counts as missed
 STEP = 1e-6  # a ray goes on behind a culled face by this part of the scene's size (float32 ray tracer: about 8 ulp)
+WRAPS = ("clamp", "repeat", "mirror")  # as shading_kernels numbers them
 BACKGROUND = (0.16, 0.17, 0.18)  # sRGB; dark enough to set off a lit room, not mistaken for a black surface
 
 
@@ -42,17 +43,33 @@ class Part:
 
 @dataclass(frozen=True)
 class Texture:
-    """A picture in linear light: rgb (h, w, 3) float32; wrap of s and of t: "clamp", "repeat" or "mirror"."""
+    """A picture: linear light (h, w, 3) float32, or integer codes of it; wrap of s and of t: "clamp", "repeat" or
+    "mirror".
 
-    rgb: np.ndarray
+    light : (k,) float32, the linear light of each code, or None. A few texels of a picture are seen, all would take
+        four times the memory of their codes.
+    """
+
+    texels: np.ndarray
     wrap: tuple = ("repeat", "repeat")
+    light: np.ndarray | None = None
+
+    @property
+    def rgb(self):
+        """Linear light (h, w, 3) float32 of all texels."""
+        return self.texels if self.light is None else self.light[self.texels]
+
+    def at(self, k):
+        """Linear light (n, 3) float32 of the texels of numbers k (n,), row after row."""
+        found = self.texels.reshape(-1, 3).take(k, 0)
+        return found if self.light is None else self.light.take(found)
 
 
 @dataclass(frozen=True)
 class Model:
     """Parts joined into one mesh, ready to be looked at."""
 
-    mesh: closest.Mesh
+    mesh: rays.Mesh
     face_part: np.ndarray  # (n_f,)
     normal: np.ndarray  # (n_f, 3) geometric, any length
     ST: np.ndarray  # (n_f, 3, 2) texture coordinates of the corners
@@ -78,7 +95,7 @@ def join(parts):
     if any(p.colour is not None for p in parts):
         colour = np.concatenate([np.ones((len(p.V), 3)) if p.colour is None else p.colour for p in parts])[F]
     face_part = np.repeat(np.arange(len(parts)), [len(p.F) for p in parts])
-    mesh, corner = closest.prepare(V, F), V[F]
+    mesh, corner = rays.prepare(V, F), V[F]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
     return Model(mesh, face_part, normal, ST[F], colour, *_twins(corner), list(parts))
 
@@ -102,11 +119,11 @@ def _twins(corner):
 
 
 def first_visible(model, origin, direction):
-    """Like `closest.first_hits`, but a ray passes through the back of a one-sided part (back-face culling).
+    """Like `rays.first_hits`, but a ray passes through the back of a one-sided part (back-face culling).
 
     Returns t (n,) in lengths of `direction`, face (n,), weight (n, 3).
     """
-    t, face, weight = closest.first_hits(model.mesh, origin, direction)
+    t, face, weight = rays.first_hits(model.mesh, origin, direction)
     two_sided = np.array([p.is_two_sided for p in model.parts] + [True])
     step = STEP * model.size / np.maximum(np.linalg.norm(direction, axis=1), 1e-300)
     for _ in range(THROUGH):
@@ -117,7 +134,7 @@ def first_visible(model, origin, direction):
         if not len(again):
             break
         start = t[again] + step[again]
-        more, face[again], weight[again] = closest.first_hits(
+        more, face[again], weight[again] = rays.first_hits(
             model.mesh, origin[again] + start[:, None] * direction[again], direction[again]
         )
         t[again] = start + more
@@ -126,11 +143,11 @@ def first_visible(model, origin, direction):
     return t, face, weight
 
 
-def _turned(model, face, weight, rays):
-    """Hits of `rays` on the back of a face with a twin become hits on the twin, in place: which (k,) bool."""
-    twin = model.twin[face[rays]]
+def _turned(model, face, weight, some):
+    """Hits of the rays `some` on the back of a face with a twin become hits on the twin, in place: which (k,) bool."""
+    twin = model.twin[face[some]]
     has = twin >= 0
-    of, old = rays[has], face[rays[has]]
+    of, old = some[has], face[some[has]]
     moved = np.take_along_axis(weight[of], model.order[old], axis=1)
     face[of] = twin[has]
     out = np.zeros_like(moved)
@@ -197,9 +214,13 @@ def shade(model, textures, face, weight):
     if model.colour is not None:
         colour *= _interpolated(model.colour, np.maximum(face, 0), weight)
     texture = np.array([p.texture for p in model.parts] + [-1]).take(part)
-    for k in np.unique(texture[texture >= 0]):
-        here = np.flatnonzero(texture == k)
-        colour[here] *= lookup(textures[k], _interpolated(model.ST, face.take(here), weight.take(here, 0)))
+    for k in np.flatnonzero(np.bincount(texture + 1)[1:]):
+        here, own = np.flatnonzero(texture == k), textures[k]
+        if own.texels.dtype == np.uint8:
+            wraps = (WRAPS.index(how) for how in own.wrap)
+            shading_kernels.multiply(here, face, weight, model.ST, own.texels, own.light, *wraps, colour)
+        else:
+            colour[here] *= lookup(own, _interpolated(model.ST, face.take(here), weight.take(here, 0)))
     return colour
 
 
@@ -211,15 +232,14 @@ def _interpolated(corners, face, weight):
 
 def lookup(texture, st):
     """Bilinear value (n, 3) at texture coordinates (n, 2): the sample of column i, row j is at ((i+.5)/w, (j+.5)/h)."""
-    h, w = texture.rgb.shape[:2]
+    h, w = texture.texels.shape[:2]
     x, y = st[:, 0] * w - 0.5, st[:, 1] * h - 0.5
     i, j = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
     a, b = ((x - i)[:, None]).astype(np.float32), ((y - j)[:, None]).astype(np.float32)
     i0, i1 = (_wrap(k, w, texture.wrap[0]) for k in (i, i + 1))
     j0, j1 = (_wrap(k, h, texture.wrap[1]) * w for k in (j, j + 1))
-    rgb = texture.rgb.reshape(-1, 3)
-    upper = (1 - a) * rgb.take(j0 + i0, 0) + a * rgb.take(j0 + i1, 0)
-    lower = (1 - a) * rgb.take(j1 + i0, 0) + a * rgb.take(j1 + i1, 0)
+    upper = (1 - a) * texture.at(j0 + i0) + a * texture.at(j0 + i1)
+    lower = (1 - a) * texture.at(j1 + i0) + a * texture.at(j1 + i1)
     return (1 - b) * upper + b * lower
 
 

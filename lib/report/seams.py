@@ -43,10 +43,9 @@ def is_smooth(first, second):
     return bool((np.einsum("nx,nx->n", first, second) > SMOOTH).all())
 
 
-def border_uv(side, is_reversed=False, n=PROBES):
+def border_uv(side, n=PROBES):
     """Parameters u, v (n,) of places along a side, its ends left out."""
     t = (np.arange(n) + 0.5) / n
-    t = t[::-1] if is_reversed else t
     fixed = np.full(n, float(side in (1, 3)))
     return (fixed, t) if side in (0, 1) else (t, fixed)
 
@@ -63,12 +62,14 @@ def exported_irradiance(maps, rho_avg, textured):
     return pack(maps.surface[kept], maps.roots[kept], maps.level[kept], H, hidden, channels=(1, 3))
 
 
-def rows(scene, casters, maps, mean_H):
+def rows(scene, casters, maps, mean_H, normals=None):
     """Steps of irradiance along borders that are smooth in space, the worst first: dicts a, b, worst, rms, relative.
 
     relative : worst over the brightest light on the border, or over the scene's mean mean_H where that is more
     maps : MapSet of H (N, G, 3), or None; borders between surfaces without maps are left out
+    normals : {(surface, side): (PROBES, 3)} of sides asked for before, added to
     """
+    normals = {} if normals is None else normals
     if maps is None:
         return []
     sides, steps = {}, []
@@ -84,11 +85,10 @@ def rows(scene, casters, maps, mean_H):
     # Ask from the worst down which borders are smooth: normals cost more than steps, and few are listed.
     listed = []
     for negative, rms, light, a, side_a, b, side_b, is_reversed in sorted(steps):
-        N = [
-            normal(scene.surfaces[s], *border_uv(side, turned)) * (-1 if scene.flip[s] else 1)
-            for s, side, turned in ((a, side_a, False), (b, side_b, is_reversed))
-        ]
-        if is_smooth(*N):
+        for s, side in ((a, side_a), (b, side_b)):
+            if (s, side) not in normals:
+                normals[s, side] = normal(scene.surfaces[s], *border_uv(side)) * (-1 if scene.flip[s] else 1)
+        if is_smooth(normals[a, side_a], normals[b, side_b][:: -1 if is_reversed else 1]):
             row = {"a": scene.names[a], "b": scene.names[b], "worst": -negative, "rms": rms}
             listed.append({**row, "relative": -negative / light if light > 0 else None})
         if len(listed) == MOST:

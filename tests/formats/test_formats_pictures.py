@@ -272,6 +272,12 @@ def test_codes_are_those_of_the_curve_itself():
         assert np.array_equal(pictures.quantise_srgb(value), np.minimum(scaled, 255).astype(np.uint8))
 
 
+def test_a_png_in_memory_is_that_of_a_file(tmp_path):
+    codes = np.random.default_rng(7).integers(0, 256, (9, 5, 3), np.uint8)
+    pictures.write_png8(tmp_path / "a.png", codes)
+    assert pictures.png_bytes(codes) == (tmp_path / "a.png").read_bytes()
+
+
 def test_only_noise_is_packed_in_a_hurry(tmp_path):
     codes = np.repeat(np.linspace(0, 255, 256).astype(np.uint8), 3 * 128).reshape(256, 128, 3)
     noise = np.random.default_rng(6).integers(0, 256, codes.shape, np.uint8)

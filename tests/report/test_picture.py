@@ -124,3 +124,12 @@ def test_two_faces_back_to_back_show_each_its_own_side():
     assert image[7, 2].tolist() == [0, 0, 255] and image[2, 7].tolist() == [0, 255, 0]
     behind = Camera((0.5, 0.5, -STRAIGHT.eye[2]), (0.5, 0.5, 0), 60)
     assert (render(model, [texture(), blue], behind, 10, 10, samples=1) == [0, 0, 255]).all()
+
+
+@pytest.mark.parametrize("wrap", [("clamp", "mirror"), ("repeat", "clamp"), ("mirror", "repeat")])
+def test_codes_and_their_light_show_what_a_picture_in_linear_light_shows(wrap):
+    codes = np.random.default_rng(4).integers(0, 256, (5, 7, 3), np.uint8)
+    light = srgb_to_linear(np.arange(256) / 255).astype(np.float32)
+    model = join([Part(SQUARE, TRIANGLES, 3 * UPRIGHT - 1, factor=(0.5, 1, 0.7), texture=0)])
+    pictures = [render(model, [one], STRAIGHT, 40, 40) for one in (texture(codes, wrap), Texture(codes, wrap, light))]
+    assert np.array_equal(*pictures) and len(np.unique(pictures[0])) > 50
