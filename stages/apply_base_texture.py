@@ -187,10 +187,12 @@ def sweep(folder, stems):
 
 
 def write_map(path, B, hidden, name, surface, rho_avg):
-    """Write the illumination map of one surface."""
+    """Write the illumination map of one surface; B is 0 where hidden."""
+    if hidden.any():  # only then it matters how the surface closes, which is long to find out
+        B = one_deep(B, hidden, is_closed(surface), collapsed_sides(surface))
     pictures.write_exr(
         path,
-        one_deep(B, hidden, is_closed(surface), collapsed_sides(surface)),
+        B,
         {
             "surface": name,
             "unit": "W/m^2",

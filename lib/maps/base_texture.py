@@ -290,5 +290,5 @@ def apply(B, rho, rho_avg):
     """
     rho_avg = np.asarray(rho_avg, np.float64)
     factor = np.divide(1, rho_avg, out=np.zeros(3), where=rho_avg > 0)
-    ratio = rho * factor.astype(np.float32)
+    ratio = rho * np.tile(factor.astype(np.float32), (rho.shape[1], 1))  # a whole row at once, not three numbers
     return np.multiply(B, ratio, out=ratio)

@@ -13,7 +13,7 @@ def lerp(array, at, wrap, axis):
     n = array.shape[axis]
     at = at - 0.5
     low = np.floor(at).astype(int)
-    t = (at - low).astype(array.dtype).reshape([-1 if k == axis else 1 for k in range(array.ndim)])
+    t = _along((at - low).astype(array.dtype), array, axis)
     if wrap:
         low, high = low % n, (low + 1) % n
     else:
@@ -23,6 +23,12 @@ def lerp(array, at, wrap, axis):
     step -= first
     step *= t
     return np.add(first, step, out=step)
+
+
+def _along(t, array, axis):
+    """Numbers t (n,) along an axis of an array, repeated over the axes behind it: numpy multiplies long rows at once."""
+    behind = array.shape[axis + 1 :]
+    return np.repeat(t, int(np.prod(behind))).reshape(-1, *behind)
 
 
 def bilinear(picture, x, y, wrap=(True, True)):
@@ -53,12 +59,11 @@ def box_means(array, low, high, axis):
 
 def _by_taps(array, low, high, first, n_taps, axis):
     """Add up the pixels an interval touches, each by its share; float32 stays float32."""
-    shape = [-1 if k == axis else 1 for k in range(array.ndim)]
     total = 0
     for k in (first + tap for tap in range(n_taps)):
         share = np.maximum(np.minimum(high, k + 1) - np.maximum(low, k), 0) / (high - low)
         part = np.take(array, k % array.shape[axis], axis)
-        part *= share.astype(array.dtype).reshape(shape)
+        part *= _along(share.astype(array.dtype), array, axis)
         total += part
     return total
 
