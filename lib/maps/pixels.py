@@ -26,7 +26,7 @@ def lerp(array, at, wrap, axis):
 
 
 def _along(t, array, axis):
-    """Numbers t (n,) along an axis of an array, repeated over the axes behind it: numpy multiplies long rows at once."""
+    """Numbers t (n,) along an axis, repeated over the axes of the array behind it: long rows are multiplied at once."""
     behind = array.shape[axis + 1 :]
     return np.repeat(t, int(np.prod(behind))).reshape(-1, *behind)
 
