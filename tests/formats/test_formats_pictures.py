@@ -279,7 +279,7 @@ def test_a_png_in_memory_is_that_of_a_file(tmp_path):
 
 
 def test_only_noise_is_packed_in_a_hurry(tmp_path):
-    codes = np.repeat(np.linspace(0, 255, 256).astype(np.uint8), 3 * 128).reshape(256, 128, 3)
+    codes = np.repeat(np.linspace(0, 255, 512).astype(np.uint8), 3 * 256).reshape(512, 256, 3)
     noise = np.random.default_rng(6).integers(0, 256, codes.shape, np.uint8)
     assert [pictures._png_level(picture) for picture in (codes, noise, noise[:9])] == [6, 2, 6]
     pictures.write_png8(tmp_path / "noise.png", noise)
