@@ -1,7 +1,6 @@
-"""First hits and closest points on a triangle mesh, by open3d (this module is its one importer).
+"""Closest points of a triangle mesh, by open3d (this module is its one importer).
 
-Used away from the bake: pictures of the exported mesh and distances between meshes. The rays of the bake are cast by
-lib.visibility.tracer, which starts faster.
+For distances between meshes. Rays are cast by lib.visibility.tracer, which starts faster.
 
 The compiled core of open3d is loaded past the package's own `__init__`, which imports its viewers, its plots and the
 machine learning add-ons: 0.46 s instead of 1.03 s (measured, version 0.20, warm files).
@@ -14,8 +13,6 @@ import types
 from dataclasses import dataclass
 
 import numpy as np
-
-RAYS_AT_ONCE = 1 << 18  # bounds the arrays in flight; open3d itself spreads a batch over all cores
 
 
 @dataclass(frozen=True)
@@ -48,42 +45,6 @@ def prepare(V, F):
     handle = geometry.RaycastingScene()
     handle.add_triangles(core.Tensor(((V - centre) / scale).astype(np.float32)), core.Tensor(F.astype(np.uint32)))
     return Mesh(V, F, centre, scale, handle)
-
-
-def first_hits(mesh, origin, direction):
-    """The first triangle along each ray.
-
-    Parameters
-    ----------
-    mesh : Mesh
-    origin, direction : (n, 3) float64
-        In the unit of V; a direction need not be a unit vector.
-
-    Returns
-    -------
-    t : (n,) float64
-        In lengths of `direction`; inf on a miss.
-    face : (n,) int64
-        -1 on a miss.
-    weight : (n, 3) float64
-        Barycentric weights of the three corners of the face; 0 on a miss.
-    """
-    origin, direction = np.asarray(origin, float), np.asarray(direction, float)
-    t, face, weight = np.full(len(origin), np.inf), np.full(len(origin), -1), np.zeros((len(origin), 3))
-    if mesh.handle is None:
-        return t, face, weight
-    core, _ = _open3d()
-    for start in range(0, len(origin), RAYS_AT_ONCE):
-        part = slice(start, start + RAYS_AT_ONCE)
-        rays = np.concatenate([(origin[part] - mesh.centre) / mesh.scale, direction[part] / mesh.scale], axis=1)
-        hit = mesh.handle.cast_rays(core.Tensor(rays.astype(np.float32)))
-        t[part] = hit["t_hit"].numpy()
-        face[part] = hit["primitive_ids"].numpy().astype(np.int64)
-        uv = hit["primitive_uvs"].numpy().astype(float)
-        weight[part] = np.stack([1 - uv.sum(1), uv[:, 0], uv[:, 1]], axis=1)
-    missed = ~np.isfinite(t)
-    face[missed], weight[missed] = -1, 0.0
-    return t, face, weight
 
 
 def closest(mesh, points):
