@@ -5,7 +5,7 @@ reads   scene.npz, casters.npz, solution.npz, and chunk_<c>.npz of sample (direc
 writes  direct_<c>.npz or indirect_<c>.npz          (lib.formats.trees)
 
 settings: seed, tolerance, tolerances, relative_to, t_direct, t_indirect, base_indirect, top, gather_rays, shadow_rays,
-smallest_cell, bounces
+smallest_cell, chart_effort, bounces
 """
 
 import numpy as np
@@ -14,7 +14,7 @@ from lib import door
 from lib.formats import casters, samples, scene, solution, trees
 from lib.formats.mistakes import listed
 from lib.radiosity.quality import LOOKUPS, gather_rays
-from lib.radiosity.refine import error_of, lookup_table, rays_of_surfaces, refine_direct, refine_indirect
+from lib.radiosity.refine import efforts, error_of, lookup_table, rays_of_surfaces, refine_direct, refine_indirect
 from lib.radiosity.thresholds import own_light, own_share, thresholds
 from lib.radiosity.turned import lit_behind
 from lib.radiosity.world import World
@@ -39,6 +39,7 @@ def body(args, cost):
     solved, chosen = solution.load(args.solution), args.settings
     own = own_share(world.scene.names, chosen)
     tau = thresholds(solved, own, args.half, chosen)
+    effort = efforts(world, own, chosen["chart_effort"])
     if args.half == "direct":
         x = samples.load(args.samples)
         done, spared = refine_direct(
@@ -49,6 +50,7 @@ def body(args, cost):
             chosen["top"],
             chosen["shadow_rays"],
             chosen["smallest_cell"],
+            effort,
         )
         cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))
     elif chosen["bounces"] == 1 or not np.any(solved.mean_H):
@@ -62,7 +64,7 @@ def body(args, cost):
         rays = rays_of_surfaces(gather_rays(chosen["gather_rays"], own), own_light(solved, chosen))
         top, base = chosen["top"], chosen["base_indirect"]
         smallest = chosen["smallest_cell"]
-        done = refine_indirect(world, mine, table, solved, chosen["seed"], tau, top, base, rays, smallest)
+        done = refine_indirect(world, mine, table, solved, chosen["seed"], tau, top, base, rays, smallest, effort)
         dark = [s for s in done if not direct[s][0].any() and not done[s].value.any()]
         if turned := lit_behind(world, dark, chosen["seed"], chosen["shadow_rays"]):
             names = listed([world.scene.names[s] for s in turned])

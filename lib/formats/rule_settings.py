@@ -36,7 +36,8 @@ def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None):
         "t_direct": q["t_direct"],
         "t_indirect": q["t_indirect"],
     }
-    refine = {name: q[name] for name in ("top", "gather_rays", "shadow_rays", "base_indirect", "smallest_cell")}
+    finer = "top", "gather_rays", "shadow_rays", "base_indirect", "smallest_cell", "chart_effort"
+    refine = {name: q[name] for name in finer}
     sample = {name: q[name] for name in ("n_elements", "rays_per_element", "base_direct", "first_shadow_rays")}
     slices = {
         "tessellate": {"sag": bake["sag"]},
@@ -103,7 +104,7 @@ def chosen_quality(bake):
     by_hand = {"n_elements": "elements", "rays_per_element": "rays_per_element", "gather_rays": "gather_rays"}
     q |= {name: bake[key] for name, key in by_hand.items() if bake[key] != "auto"}
     if bake["shadow_rays"] != "auto":
-        q["shadow_rays"] = q["first_shadow_rays"] = bake["shadow_rays"]
+        q |= {"shadow_rays": bake["shadow_rays"], "first_shadow_rays": bake["shadow_rays"], "chart_effort": 1.0}
     return q
 
 

@@ -63,10 +63,13 @@ def tree_of(world, s, base, smallest):
     return Quadtree(world.lattices[s], base, world.channels, world.side(s), cover, world.finest(s), smallest)
 
 
-def refine_direct(world, base, seed, tau, top, shadow_rays, smallest=SMALLEST_CELL):
+def refine_direct(world, base, seed, tau, top, shadow_rays, smallest=SMALLEST_CELL, effort=None):
     """Direct trees from their base lattices.
 
-    base : {surface: (value (h, w, C), hidden, noise, level)}.  Returns {surface: Quadtree} and counts of spared rays.
+    base : {surface: (value (h, w, C), hidden, noise, level)}; effort : as efforts has it, None for all.
+    Returns {surface: Quadtree} and counts of spared rays.
+
+    A surface of less effort gets that share of the first shadow rays, and none for doubts.
     """
     trees, spared = {}, np.zeros(3, dtype=np.int64)
     for s, (value, hidden, noise, level) in base.items():
@@ -83,16 +86,32 @@ def refine_direct(world, base, seed, tau, top, shadow_rays, smallest=SMALLEST_CE
         return sample
 
     n0, n1 = shadow_rays
-    refine(world, trees, sampler((n0, n1)), seed, tau, top, recheck=sampler((n1, n1)))
+    effort = np.ones(world.n) if effort is None else effort
+    whole = {s: tree for s, tree in trees.items() if effort[s] >= 1}
+    refine(world, whole, sampler((n0, n1)), seed, tau, top, recheck=sampler((n1, n1)))
+    for share in sorted({float(effort[s]) for s in trees if effort[s] < 1}):
+        less = {s: tree for s, tree in trees.items() if effort[s] == share}
+        refine(world, less, sampler((max(1, round(share * n0)), n1)), seed, tau, top)
     return trees, spared
 
 
-def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, smallest=SMALLEST_CELL):
+def efforts(world, own, chart_effort):
+    """(n,) share of the usual effort that samples of each surface are worth: chart_effort on meshes, whose cells stop
+    at those of their atlas however the light changes, but where a finer tolerance is asked; 1 elsewhere.
+
+    own : (n,) of own_share
+    """
+    is_mesh = np.array([world.finest(s) is not None for s in range(world.n)], dtype=bool)
+    return np.where(is_mesh & (own >= 1), chart_effort, 1.0)
+
+
+def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, smallest=SMALLEST_CELL, effort=None):
     """Indirect trees of `surfaces`, by gather rays through the LookupTable: {surface: Quadtree}.
 
     solution : has spread, H_element, n_u, n_v, first; K (surfaces,) gather rays
-    for a large cell of usual surroundings.
+    for a large cell of usual surroundings; effort : as efforts has it, None for all.
     """
+    effort = np.ones(world.n) if effort is None else effort
     trees = {s: tree_of(world, s, world.base_level(s, level), smallest) for s in surfaces}
 
     def sample(points):
@@ -103,7 +122,8 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, 
             np.zeros(n, np.float32),
             np.zeros(n, np.float32),
         )
-        rays = rays_for(points.cell, contrast_at(points, solution), K[points.surface])
+        tiny = np.where(effort[points.surface] < 1, points.cell / smallest, 1.0)
+        rays = rays_for(points.cell, contrast_at(points, solution), K[points.surface], tiny)
         for k in np.flatnonzero(np.bincount(rays)):  # np.unique loads numpy.ma, 0.06 s
             of = np.flatnonzero(rays == k)
             light = indirect_light(
@@ -117,14 +137,16 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, 
     return trees
 
 
-def rays_for(cell, contrast, K):
+def rays_for(cell, contrast, K, tiny=1.0):
     """Gather rays of samples: K for cells of LARGE_CELL where the light around varies by USUAL_CONTRAST.
 
-    cell, contrast, K (n,).  With variance ~ contrast^2 rays^-1.6, the sum of area x variance is least for a given
-    number of rays when rays ~ (area contrast^2)^(1/2.6).  Rounded to sizes that share a batch.
+    cell, contrast, K (n,); tiny (n,) : below 1, the side of a cell over the smallest that light would be followed to,
+    whose sample may have fewer than the least.  With variance ~ contrast^2 rays^-1.6, the sum of area x variance is
+    least for a given number of rays when rays ~ (area contrast^2)^(1/2.6).  Rounded to sizes that share a batch.
     """
     need = K * np.minimum(1.0, cell / LARGE_CELL) ** (2 / 2.6) * (contrast / USUAL_CONTRAST) ** (2 / 2.6)
-    need = np.clip(need, np.maximum(np.minimum(LEAST_RAYS, K / 2), K / 8), 4 * K)
+    least = np.maximum(np.minimum(LEAST_RAYS, K / 2), K / 8) * np.minimum(1.0, tiny) ** (2 / 2.6)
+    need = np.clip(need, least, 4 * K)
     return np.maximum(16 * np.round(2 ** (np.round(2 * np.log2(need)) / 2) / 16), 16).astype(np.int64)
 
 

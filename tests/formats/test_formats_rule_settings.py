@@ -57,6 +57,13 @@ def test_a_setting_moves_its_slices_alone(changed, stages):
     assert "report" in moved  # it shows them all
 
 
+def test_shadow_rays_fixed_by_hand_are_those_of_meshes_too():
+    coarse = settings(bake__tolerance=0.02)
+    assert json.loads(rule_settings(coarse)["refine"])["chart_effort"] < 1
+    fixed = json.loads(rule_settings(settings(bake__tolerance=0.02, bake__shadow_rays=[16, 32]))["refine"])
+    assert fixed["chart_effort"] == 1 and fixed["shadow_rays"] == [16, 32]
+
+
 def test_a_level_is_a_share_of_the_first_if_that_is_none():
     named, other = {"deviation": "1 mm"}, {"triangles": 60}
     assert [share for _, share in lod_levels([named, 0.3, {"share": 0.1}, other])] == [False, True, True, False]

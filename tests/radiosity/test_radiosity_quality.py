@@ -18,6 +18,7 @@ def test_a_finer_tolerance_never_asks_for_less():
     for coarse, fine in zip(steps[1:], steps[:-1], strict=True):
         assert fine.n_elements >= coarse.n_elements and fine.gather_rays >= coarse.gather_rays
         assert fine.shadow_rays[1] >= coarse.shadow_rays[1] and fine.shadow_rays[0] <= fine.shadow_rays[1]
+        assert fine.chart_effort >= coarse.chart_effort
         assert fine.t_direct < coarse.t_direct and fine.t_indirect < coarse.t_indirect
 
 
@@ -34,6 +35,10 @@ def test_the_numbers_fit_their_stages(tolerance, top):
     q = quality(tolerance, top)
     assert q.top == top and q.gather_rays % 16 == 0 and 16 <= q.gather_rays <= 8192
     assert q.as_dict()["shadow_rays"] == q.shadow_rays
+
+
+def test_meshes_get_less_above_the_standard_tolerance_alone():
+    assert [quality(t).chart_effort for t in (0.002, 0.01, 0.014, 0.1)] == [1, 1, 0.5, 0.5]
 
 
 def test_rays_for_a_ratio_of_tolerances():
@@ -82,7 +87,17 @@ def test_rays_grow_with_the_cell_and_with_the_contrast_around():
     assert abs(rays_for(np.array([0.125]), np.array([0.6]), np.array([256.0]))[0] - 256) <= 16
 
 
+def test_cells_too_small_for_the_light_may_get_fewer_than_the_least():
+    """By their area to the power 1 / 2.6; cells that are not tiny the same as ever."""
+    tiny, K = np.array([1.0, 4.0, 1 / 4, 1 / 16]), np.full(4, 6400.0)
+    rays = rays_for(np.full(4, 1e-5), np.full(4, 0.6), K, tiny)
+    assert rays[0] == rays[1] == rays_for(np.array([1e-5]), np.array([0.6]), K[:1])[0] >= 640
+    assert rays[0] > rays[2] > rays[3] >= 16
+    assert rays[3] == pytest.approx(800 * 16 ** (-2 / 2.6), rel=0.3)
+
+
 def test_a_sample_never_gets_no_ray():
     cells, contrast = np.array([1e-4, 1e-3, 0.1]), np.array([0.01, 0.1, 1.0])
     for K in (16.0, 32.0, 960.0):
-        assert (rays_for(cells, contrast, np.full(3, K)) >= 16).all()
+        for tiny in (1.0, np.full(3, 1e-3)):
+            assert (rays_for(cells, contrast, np.full(3, K), tiny) >= 16).all()
