@@ -196,18 +196,6 @@ def test_places_are_those_of_the_library():
         assert history.counts()[k] == len(left)
 
 
-def test_closest_weights():
-    A, B, C = np.array([[0.0, 0, 0]]), np.array([[2.0, 0, 0]]), np.array([[0.0, 2, 0]])
-    for P, weight in (
-        ([0.5, 0.5, 3.0], [0.5, 0.25, 0.25]),
-        ([-1.0, -1.0, 1.0], [1, 0, 0]),
-        ([1.0, -1.0, 0.0], [0.5, 0.5, 0]),
-        ([3.0, 3.0, 0.0], [0, 0.5, 0.5]),
-        ([5.0, -1.0, 0.0], [0, 1, 0]),
-    ):
-        assert np.allclose(carry.closest_weights(A, B, C, np.array([P]))[0], weight, atol=EXACT)
-
-
 def mixed():
     """A scene of a NURBS sphere of radius 1 and a mesh of one of radius 2, in their frame."""
     surfaces = [shapes.sphere(), transformed(sphere(24), np.diag([2.0, 2, 2, 1]))]
@@ -311,10 +299,8 @@ def test_what_both_meshes_have_is_off_by_nothing(ball, count, monkeypatch):
     original = Original(ball.meshes[0])
     quick = original.measure(patch.S, patch.UV, patch.F)
     searched = []
-    nearest = mesh_distance._nearest
-    monkeypatch.setattr(
-        mesh_distance, "_nearest", lambda mesh, points: searched.append(len(points)) or nearest(mesh, points)
-    )
+    far = mesh_distance._far
+    monkeypatch.setattr(mesh_distance, "_far", lambda *args: searched.append(len((found := far(*args))[0])) or found)
     original.measure(patch.S, patch.UV, patch.F)
     few = sum(searched)
     monkeypatch.setattr(mesh_distance.Rows, "holds", lambda self, rows: np.zeros(len(rows), bool))
