@@ -20,6 +20,8 @@ from functools import cached_property
 
 import numpy as np
 
+from lib.lod import collapse_kernels as kernels
+
 FAR = 10.0  # frames, to the corners of added triangles: the way to them costs more than any collapse
 TILT = 1e-5  # of a tag against the surface, so that its far corner is not as good a place as the vertex
 SCALE = 1000.0  # units a frame: the library's thresholds are then distances of 3e-6 to 3 frames
@@ -87,8 +89,7 @@ def with_added(V, F, seam, seam_face, locked):
     e, g = V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]
     face = _unit(np.cross(e, g))
     N = np.zeros_like(V)
-    for k in range(3):
-        np.add.at(N, F[:, k], face)
+    kernels.sum_at_corners(F.astype(np.int32), face, N)
     N = _unit(N)
     a = _unit(np.cross(N, np.eye(3)[np.abs(N).argmin(axis=1)]))
     b = np.cross(N, a)
@@ -113,7 +114,7 @@ def history(V, F, added, pair):
 
     It ends before the first step that would take a vertex of the mesh to a far corner.
     """
-    pair = np.asarray(pair, dtype=np.int64).reshape(-1, 2)
+    pair = np.ascontiguousarray(pair, dtype=np.int64).reshape(-1, 2)
     own, at, is_sound = _replayed(V, added, pair)
     is_kept = is_sound.cumprod(dtype=bool) & (own >= 0).all(axis=1)
     own, at = own[is_kept], at[is_kept]
@@ -148,40 +149,15 @@ def _replayed(V, added, pair):
     for none, and where the library puts the vertex.
 
     It does not say, and its own replay_simplification takes 40 s for 331 k triangles; what it does is
-    `calculate_error` of its Simplify.h for two border vertices: the best of the two ends and the middle.  Collapses
-    that do not wait for each other are replayed at once; there are about a hundred rounds.
+    `calculate_error` of its Simplify.h for two border vertices: the best of the two ends and the middle.
     """
     Q, X = _quadrics(added), added.P.copy()
     Y = np.zeros_like(X)
     Y[: len(V)] = V
     stands = np.where(np.arange(len(X)) < len(V), np.arange(len(X)), -1)  # for which of the mesh's own
     own, at, is_sound = np.empty_like(pair), np.empty((len(pair), 3)), np.empty(len(pair), dtype=bool)
-    for step in _rounds(pair, len(X)):
-        a, b = pair[step].T
-        q = Q[b] + Q[a]
-        ends = (X[a], X[b], (X[a] + X[b]) / 2)
-        error = np.stack([_error(q, x) for x in ends])
-        best = 2 - (error == error.min(axis=0))[::-1].argmax(axis=0)  # the last of equal ones, as there
-        X[a] = np.choose(best[:, None], ends)
-        own[step] = both = np.stack([stands[a], stands[b]], axis=1)
-        is_real = both >= 0
-        keeps = np.where(is_real[:, 0] == is_real[:, 1], True, best == np.where(is_real[:, 0], 0, 1))
-        Y[a] = np.choose(best[:, None], (Y[a], Y[b], (Y[a] + Y[b]) / 2))
-        stands[a] = np.where(is_real[:, 0], both[:, 0], both[:, 1])
-        Q[a] = q
-        at[step], is_sound[step] = Y[a], keeps
+    kernels.replay(pair, Q, X, Y, stands, own, at, is_sound)
     return own, at, is_sound
-
-
-def _rounds(pair, p):
-    """The collapses in groups, each vertex once in a group and every group after those it depends on."""
-    depth, of = [0] * p, []
-    for a, b in pair.tolist():
-        depth[a] = max(depth[a], depth[b]) + 1
-        of.append(depth[a])
-    of = np.array(of, dtype=np.int64)
-    order = np.argsort(of, kind="stable")
-    return np.split(order, np.flatnonzero(np.diff(of[order])) + 1) if len(pair) else []
 
 
 def _quadrics(added):
@@ -192,17 +168,8 @@ def _quadrics(added):
     (a, b, c), d = n.T, -(n * A).sum(axis=1)
     planes = np.stack([a * a, a * b, a * c, a * d, b * b, b * c, b * d, c * c, c * d, d * d], axis=1)
     Q = np.zeros((len(added.P), 10))
-    for k in range(3):
-        np.add.at(Q, added.T[:, k], planes)
+    kernels.sum_at_corners(added.T, planes, Q)
     return Q
-
-
-def _error(q, x):
-    q, (x, y, z) = q.T, x.T
-    return (
-        (q[0] * x * x + 2 * q[1] * x * y + 2 * q[2] * x * z + 2 * q[3] * x + q[4] * y * y)
-        + (2 * q[5] * y * z + 2 * q[6] * y + q[7] * z * z + 2 * q[8] * z + q[9])
-    )  # fmt: skip
 
 
 def _unit(vectors):
