@@ -10,7 +10,7 @@ ROWS = np.array([[1.0, 2.0], [2.0, 1.0], [1.0, 2.0], [0.0, 3.0], [-0.0, 3.0], [2
 
 @pytest.fixture
 def full(monkeypatch):
-    """Tables of four places for three or four rows: most are not where their hash says, and are compared with others."""
+    """Tables of four places for three or four rows: most are not where their hash says."""
     whole = np.full
     monkeypatch.setattr(rows.np, "full", lambda n, x: whole(min(n, 4), x))
 
