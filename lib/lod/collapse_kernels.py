@@ -1,4 +1,7 @@
-"""Compiled steps of lib.lod.collapse.  Quadrics (p, 10) are the upper triangles of n n' with n (a, b, c, d)."""
+"""Compiled steps of lib.lod.collapse, and sums for lib.lod.thinned.
+
+Quadrics (p, 10) are the upper triangles of n n' for planes n = (a, b, c, d), row by row.
+"""
 
 import numpy as np
 
@@ -12,6 +15,15 @@ def sum_at_corners(T, x, out):
         for t in range(len(T)):
             for c in range(x.shape[1]):
                 out[T[t, k], c] += x[t, c]
+    return 0
+
+
+@compiled("i8[:], f8[:,:], f8[:,:]")
+def sum_rows(number, x, out):
+    """Add each row of x (n, c) to the row of its number in out."""
+    for i in range(len(x)):
+        for c in range(x.shape[1]):
+            out[number[i], c] += x[i, c]
     return 0
 
 

@@ -13,6 +13,7 @@ import fast_simplification
 import numpy as np
 
 from lib.lod import carry, collapse
+from lib.lod import collapse_kernels as kernels
 from lib.lod.mesh_distance import Original
 from lib.nurbs.facets import Patch, normals
 from lib.surfaces import mesh_pieces
@@ -115,7 +116,9 @@ class Thinned:
         becomes flat or turns too far from what it was given as (a, 3); in base, none has.
         """
         n = len(base)
-        A, c, area = (np.stack([np.bincount(root, x, n) for x in each.T], axis=1) for each in self._planes)
+        A, c, area = (np.zeros((n, each.shape[1])) for each in self._planes)
+        for each, total in zip(self._planes, (A, c, area), strict=True):
+            kernels.sum_rows(root, each, total)
         used = np.unique(F)
         A, c, hold = A[used].reshape(-1, 3, 3), c[used], PULL * area[used]
         step = -np.linalg.solve(
@@ -146,9 +149,10 @@ def _planes(V, F, seam, seam_face):
     A, c, total = np.zeros((len(V), 9)), np.zeros((len(V), 3)), np.zeros((len(V), 1))
     for vertex, n, weight in each:
         d = -np.einsum("ij,ij->i", n, V[vertex])
-        np.add.at(A, vertex, weight[:, None] * (n[:, :, None] * n[:, None, :]).reshape(-1, 9))
-        np.add.at(c, vertex, (weight * d)[:, None] * n)
-        np.add.at(total, vertex, weight[:, None])
+        vertex = np.ascontiguousarray(vertex)
+        kernels.sum_rows(vertex, weight[:, None] * (n[:, :, None] * n[:, None, :]).reshape(-1, 9), A)
+        kernels.sum_rows(vertex, (weight * d)[:, None] * n, c)
+        kernels.sum_rows(vertex, weight[:, None].copy(), total)
     return A, c, total
 
 
