@@ -1,4 +1,5 @@
-"""Equal rows of arrays, found in a table by the hash of their bits: many times faster than sorting rows."""
+"""Equal rows of arrays, found in a table by the hash of their bits: two to four times as fast as sorting the hashes
+(measured, 400 k rows of 3)."""
 
 import numpy as np
 
