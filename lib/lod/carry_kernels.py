@@ -6,8 +6,8 @@ is_open (k,) that it has none yet.
 """
 
 from lib.compiled import compiled
+from lib.lod.closest_kernels import along_edge, on_triangle
 from lib.surfaces.row_kernels import join, root_of
-from lib.visibility.nearest_kernels import along_edge, on_triangle
 
 
 @compiled("i8[:,:], i8[:,:], i8[:], i8[:]")

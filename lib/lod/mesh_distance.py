@@ -10,9 +10,10 @@ from functools import cached_property
 
 import numpy as np
 
+from lib.lod.closest_kernels import closest_weights
 from lib.nurbs.facets import normals
 from lib.surfaces.rows import Rows
-from lib.visibility.nearest import Tree
+from lib.visibility import closest
 
 PLACES = 10_000  # inside of triangles, about: in the largest, where there are more
 MOST_STEPS = 8  # along an edge
@@ -35,12 +36,12 @@ class Original:
 
     @cached_property
     def _shape(self):
-        return Tree(self.mesh.V, self.mesh.F)
+        return closest.prepare(self.mesh.V, self.mesh.F)
 
     @cached_property
     def _map(self):
         flat = np.concatenate([self.mesh.uv.reshape(-1, 2), np.zeros((3 * len(self.mesh.F), 1))], axis=1)
-        return Tree(flat, np.arange(len(flat)).reshape(-1, 3))
+        return closest.prepare(flat, np.arange(len(flat)).reshape(-1, 3))
 
     @cached_property
     def _samples(self):
@@ -70,15 +71,10 @@ class Original:
         (corners, largest, share), (places, pairs, triangles, maps) = self._samples, self._known
         sides = self.mesh.V[largest]
         has_sides = Rows(V[F].reshape(-1, 9)).holds(sides.reshape(-1, 9))
-        points, is_far = _far(corners, Rows(V).holds(corners), sides, has_sides)
-        off = np.zeros(len(is_far))
-        off[is_far] = Tree(V, F).distances_beyond(0.0, points, (share > 0)[is_far])
+        off = _off(closest.prepare(V, F), corners, Rows(V).holds(corners), sides, has_sides)
         some = _largest(V, F)
-        points, _ = _far(V, places.holds(V), V[some], triangles.holds(V[some].reshape(-1, 9)))
-        # Of the way back only what is farther counts.
-        distance, slide = float(off.max()), 0.0
-        back = self._shape.distances_beyond(distance, points, np.zeros(len(points), dtype=bool))
-        distance = max(distance, float(back.max(initial=0.0)))
+        off_made = _off(self._shape, V, places.holds(V), V[some], triangles.holds(V[some].reshape(-1, 9)))
+        distance, slide = float(max(off.max(), off_made.max())), 0.0
         if self.mesh.uv is not None:
             both = np.concatenate([V, UV], axis=1)
             both, _ = _far(both, pairs.holds(both), both[some], maps.holds(both[some].reshape(-1, 15)))
@@ -87,7 +83,7 @@ class Original:
 
     def at(self, uv):
         """Places (n, 3) of uv (n, 2), or of the closest pairs in a chart."""
-        face, weight = self._map.places(np.concatenate([uv, np.zeros((len(uv), 1))], axis=1))
+        _, face, weight = _nearest(self._map, np.concatenate([uv, np.zeros((len(uv), 1))], axis=1))
         return np.einsum("nk,nkc->nc", weight, self.mesh.V[self.mesh.F[face]])
 
 
@@ -100,11 +96,28 @@ def _largest(V, F):
     return F[np.argsort(-_areas(V, F), kind="stable")[:PLACES]]
 
 
+def _off(mesh, corners, has_corner, triangles, has_triangle):
+    """Distances from a prepared mesh of corners (a, 3), then of places in triangles (t, 3, 3); 0 of those it has."""
+    points, is_far = _far(corners, has_corner, triangles, has_triangle)
+    off = np.zeros(len(is_far))
+    off[is_far] = _nearest(mesh, points)[0]
+    return off
+
+
 def _far(corners, has_corner, triangles, has_triangle):
     """(points (f, c), is_far (n,)) of corners (a, c) and of places in triangles (t, 3, c): those a mesh has not."""
     inside = within(triangles)
     is_far = ~np.concatenate([has_corner, np.repeat(has_triangle, len(inside) // len(triangles))])
     return np.concatenate([corners, inside])[is_far], is_far
+
+
+def _nearest(mesh, points):
+    """Distance (n,), face (n,) and weights (n, 3) of the closest places; of the face that float32 found, exactly."""
+    face = closest.closest(mesh, points)[1] if len(points) else np.zeros(0, dtype=np.int64)
+    corner, weight = mesh.V[mesh.F[face]], np.empty((len(points), 3))
+    closest_weights(corner, np.ascontiguousarray(points), weight)
+    at = np.einsum("nk,nkc->nc", weight, corner)
+    return np.linalg.norm(at - points, axis=1), face, weight
 
 
 def within(corner):
