@@ -13,7 +13,7 @@ from lib.radiosity.quality import first_level, quality
 RAYS_A_JOB = 24e6  # about 4 s of one core
 MOST_CHUNKS = 64
 SURFACE_RAYS = 8e4  # as many take as long as what a surface costs, however small
-MESH_RAYS = 8  # a finest cell of a mesh's map: some are sampled whatever the light
+MESH_RAYS = 24  # a finest cell of a mesh's map: some are sampled whatever the light
 MORE = 3  # samples in the end for one on the first lattices
 SHADOW_RAYS = 24  # a sample, of a few lights in view
 GATHER_RAYS = 0.1  # of a sample, an element of the coarse solution: roughly what a tolerance asks for with as many
