@@ -1,4 +1,5 @@
-"""What was read from a geometry file, kept so that the next to ask need not read it again.
+"""What was read from a geometry file, or found out about a scene's sheets, kept so that the next to ask need not do it
+again.
 
 A scene is read while the Snakefile is parsed, and again by its first job.  A kept reading is found by the bytes of the
 file, how it was read, what lies in its folder but scene.yaml, which no reader opens, and the code that read it.
@@ -16,7 +17,8 @@ from lib.formats.artefact import ArtefactError
 from lib.formats.patches import GeometryFile, Patch
 
 KIND, VERSION = "geometry", 2
-CODE = ("lib/formats", "lib/surfaces", "lib/nurbs")
+CODE = ("lib/formats", "lib/surfaces", "lib/nurbs", "lib/visibility")
+SIDES = "sides.json"
 ROOT = Path(__file__).resolve().parents[2]
 MOST = 10_000  # files of a folder that are looked at
 SETTINGS = "scene.yaml"
@@ -85,6 +87,23 @@ def save(folder, name, content):
     kept = sorted(Path(folder).glob("*.npz"), key=lambda path: path.stat().st_mtime_ns)
     for path in kept[:-KEPT]:
         path.unlink(missing_ok=True)
+
+
+def sides(folder, home, settings, find):
+    """What `find` returns, two sets of names, kept in `folder` with what it hangs on: the settings given, the files
+    in `home`, and the code.
+    """
+    text = json.dumps([settings, fingerprint(home), _code()], sort_keys=True, default=str)
+    key, path = hashlib.sha256(text.encode()).hexdigest(), Path(folder) / SIDES
+    try:
+        kept = artefact.read_json(path)
+        if kept["key"] == key:
+            return tuple(set(kept[name]) for name in ("both", "turned"))
+    except (ArtefactError, KeyError, TypeError):
+        pass
+    both, turned = find()
+    artefact.write_json(path, {"key": key, "both": sorted(both), "turned": sorted(turned)})
+    return both, turned
 
 
 def _plain(value):

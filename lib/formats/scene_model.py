@@ -5,10 +5,11 @@ sheets get light on both sides.
 """
 
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
-from lib.formats import scene_folder, scene_geometry, scene_import, scene_rules, scene_table
+from lib.formats import geometry_cache, scene_folder, scene_geometry, scene_import, scene_rules, scene_table
 from lib.formats.emission_pictures import EmissionPictures
 from lib.formats.mistakes import listed
 from lib.formats.quantities import METRES
@@ -17,6 +18,7 @@ from lib.surfaces.measure import points
 STUDIO = "studio light"
 STUDIO_WIDTH, STUDIO_HEIGHT = 1.5, 0.75  # of the model's largest side: the lamp's side, and its height above the model
 STUDIO_EMISSION = 10.0  # W/m2 a channel
+LATER = ("bake", "budget", "lods", "export", "camera")  # settings that say nothing about surfaces and light
 BACK = "back"  # name of the surface on the other side of x: x/back
 
 
@@ -40,8 +42,8 @@ def read(folder, overrides=None, cache=None):
     """Read the scene in `folder`; Refusal lists what is wrong.  cache : folder where readings of files are kept."""
     source = scene_folder.read(folder, overrides)
     scene_rules.check(source)
-    settings = dict(source.settings)
-    where = source.where
+    settings, where = dict(source.settings), source.where
+    told = {name: value for name, value in source.settings.items() if name not in LATER}
 
     def load(entries):
         return scene_geometry.load(entries, settings["units"], source.folder, source.file, where, settings["up"], cache)
@@ -57,7 +59,8 @@ def read(folder, overrides=None, cache=None):
         placed = placed + [replace(one, entry=index) for one in load([entry]).placed]
     shining = EmissionPictures(source.folder, source.file, pictures)
     table = scene_table.resolve(settings, placed, where, strict=False, average=shining.average)
-    both, turned = both_sides(placed, table)
+    kept = partial(geometry_cache.sides, cache, source.folder, told) if cache else None
+    both, turned = both_sides(placed, table, kept)
     backs = with_backs(placed, both)
     table = scene_table.resolve(settings, backs, where, average=shining.average)
     for name in turned:
@@ -95,10 +98,11 @@ def before(placed, units, up):
     return {"eye": eye.tolist(), "target": centre.tolist(), "fov": 40}
 
 
-def both_sides(placed, table):
+def both_sides(placed, table, kept=None):
     """Names of the surfaces that are lit on both sides, and of those that are lit on their back alone.
 
     Both: those said to be, and open sheets where it turns out so.  The side an open sheet faces says little in a file.
+    kept : asks its argument only if the answer is not known from before
     """
     said = {one.name for one in placed if table[one.name]["two_sided"] is True}
     asked = [k for k, one in enumerate(placed) if table[one.name]["two_sided"] == "auto" and may_be_open(one, table)]
@@ -106,8 +110,11 @@ def both_sides(placed, table):
         return said, set()
     from lib.formats.open_sheets import lit_sides  # rays, which few scenes need while they are read
 
-    both, turned = lit_sides(placed, table, asked)
-    return said | {placed[k].name for k in both}, {placed[k].name for k in turned}
+    def find():
+        return [{placed[k].name for k in found} for found in lit_sides(placed, table, asked)]
+
+    both, turned = kept(find) if kept else find()
+    return said | both, turned
 
 
 def may_be_open(one, table):

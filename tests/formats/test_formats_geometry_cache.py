@@ -4,7 +4,7 @@ import os
 
 import pytest
 
-from lib.formats import geometry_cache, geometry_file, obj, scene_geometry
+from lib.formats import geometry_cache, geometry_file, obj, open_sheets, scene_geometry, scene_model
 
 SHEET = "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\ng one\nusemtl m\nf 1 2 3\ng two\nf 2 4 3\n"
 
@@ -45,6 +45,47 @@ def test_other_options_files_beside_it_and_code_are_read_anew(read, tmp_path, mo
     assert read()[1] and not read()[1]
     monkeypatch.setattr(geometry_cache, "_code", lambda: "another reader")
     assert read()[1] and not read()[1]
+
+
+def test_what_was_found_of_sheets_holds_until_something_changes(tmp_path):
+    asked, home, folder = [], tmp_path / "home", tmp_path / "cache"
+    home.mkdir()
+    (home / "a.obj").write_text("v 0 0 0")
+
+    def sides(**settings):
+        before = len(asked)
+        found = geometry_cache.sides(folder, home, settings, lambda: asked.append(1) or ({"b", "a"}, {"c"}))
+        assert found == ({"a", "b"}, {"c"})
+        return len(asked) > before
+
+    assert sides(up="z") and not sides(up="z")
+    (home / "scene.yaml").write_text("lods: [1]")
+    assert not sides(up="z")
+    assert sides(up="y") and not sides(up="y")
+    (home / "a.obj").write_text("v 0 0 0.5")
+    assert sides(up="y") and not sides(up="y")
+    (folder / geometry_cache.SIDES).write_text("{")
+    assert sides(up="y") and not sides(up="y")
+
+
+def test_levels_of_detail_do_not_ask_again_which_sides_are_lit(tmp_path, monkeypatch):
+    scene = """
+geometry:
+- {name: sheet, rectangle: {origin: [0, 0, 0], u: [1, 0, 0], v: [0, 1, 0]}, material: card, two_sided: auto}
+- {name: lamp, rectangle: {origin: [0, 0, -1], u: [1, 0, 0], v: [0, 1, 0]}, material: lamp}
+materials: {card: {reflectance: 0.5}, lamp: {emission: %d}}
+lods: [%g]
+"""
+    asked, original = [], open_sheets.lit_sides
+    monkeypatch.setattr(open_sheets, "lit_sides", lambda *args: asked.append(1) or original(*args))
+
+    def turned(light, level):
+        (tmp_path / "scene.yaml").write_text(scene % (light, level))
+        model = scene_model.read(tmp_path, None, tmp_path / "results" / "cache")
+        return bool(model.table["sheet"]["turn"])
+
+    assert turned(1, 1) and turned(1, 0.5) and len(asked) == 1
+    assert turned(2, 0.5) and len(asked) == 2
 
 
 def test_a_damaged_reading_is_made_again(read, tmp_path):
