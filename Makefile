@@ -107,6 +107,8 @@ setup:  ## only create .venv from requirements.lock and check the system's libra
 	    say "make: $$(tail -n 1 .venv/import.log)"
 	    say "open3d needs libraries that this system lacks. Type"; command_to_type $(SYSTEM_PACKAGES); exit 1
 	fi
+	say "Compiling the inner loops for this machine, once."
+	.venv/bin/python -c 'from lib.compiled import compile_all; compile_all()' || say "make: that failed; the first bake will do it."
 	touch .venv/system.stamp
 
 lock:  ## write requirements.lock anew from pyproject.toml (needs uv)

@@ -152,6 +152,15 @@ def test_what_is_kept_can_be_loaded_ahead_and_nothing_else(tmp_path, monkeypatch
     assert again.sums._entry is not None and again.sums(*arguments()) == 3
 
 
+def test_the_set_up_compiles_all_there_is():
+    compiled.compile_all()
+    users = [p for p in (ROOT / "lib").rglob("*.py") if "import compiled" in p.read_text(encoding="utf-8")]
+    modules = [importlib.import_module(".".join(p.relative_to(ROOT).with_suffix("").parts)) for p in users]
+    having = [module for module in modules if compiled._kernels(module)]
+    assert len(having) > 10
+    assert not [module.__name__ for module in having if compiled._kept(*compiled._places(module)) is None]
+
+
 def test_a_damaged_file_is_made_anew(tmp_path):
     module_of(tmp_path).sums(*arguments())
     (path,) = (tmp_path / "__pycache__").glob("*.o")
