@@ -25,7 +25,6 @@ import numpy as np
 FROM_C = {"memcpy", "memmove", "memset", "sqrt", "sqrtf", "sin", "sinf", "cos", "cosf", "atan2", "floor", "floorf"}
 NUMBERS = {"i8": ctypes.c_int64, "f8": ctypes.c_double, "f4": ctypes.c_float}  # arguments that are no array
 
-
 _modules, _ready = set(), set()  # names of modules with kernels; those that load_kept is done with
 
 
@@ -93,9 +92,8 @@ def compile_all():
 
     root = Path(__file__).resolve().parents[1]
     paths = sorted(p for p in (root / "lib").rglob("*.py") if "\n@compiled(" in p.read_text(encoding="utf-8"))
-    names = [".".join(path.relative_to(root).with_suffix("").parts) for path in paths]
     with ProcessPoolExecutor() as pool:
-        list(pool.map(_compile_one, names))
+        list(pool.map(_compile_one, (".".join(p.relative_to(root).with_suffix("").parts) for p in paths)))
 
 
 def _compile_one(name):

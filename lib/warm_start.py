@@ -1,11 +1,11 @@
 """One process that has numpy and the stages loaded, and a fork of it for each job of a bake.
 
 Starting an interpreter and importing numpy and a stage costs a job 0.15 to 0.25 CPU s, more than what most jobs of a
-small scene do; a fork costs 0.01 s.  `start` is called once by the Snakefile when a run begins; jobs reach the process
-through `stages/__main__.py`, which runs the stage by itself where there is no such process (on other machines, by
-hand).  A stage is loaded when its first job comes, before the fork, with its compiled loops; what two jobs found to
-load besides, such as OpenImageIO, is loaded before the next of any kind.  No module starts a thread when it is loaded,
-which a fork would lose.
+small scene do; a fork costs 0.01 s.  The Snakefile calls `start` when a run begins, or before, to have the scene read;
+jobs reach the process through `stages/__main__.py`, which runs the stage by itself where there is no such process (on
+other machines, by hand).  A stage is loaded when its first job comes, before the fork, with its compiled loops; what
+two jobs found to load besides, such as OpenImageIO, is loaded before the next of any kind.  No module starts a thread
+when it is loaded, which a fork would lose.
 
 A request is a message of 8 bytes, the length of what follows, and texts with a zero byte between them: working folder,
 number of arguments, stage, arguments, NAME=VALUE of the environment; with it come the file descriptors of standard

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lib.nurbs.curve_kernels import farthest
 from lib.nurbs.evaluate import evaluate_grid
-from lib.nurbs.polyline_kernels import farthest
 
 SAMPLES = np.linspace(0.0, 1.0, 9)
 FINE = 8  # finer steps per sample, for curves that differ in speed

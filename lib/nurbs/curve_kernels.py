@@ -1,4 +1,4 @@
-"""Compiled points of NURBS curves, and distances from chords.
+"""Compiled points of NURBS curves, and distances from chords and polylines.
 
 Source: Piegl, Tiller, The NURBS Book: A2.1 (span), A2.2 (basis), eq. 4.1 (rational curve).
 """
@@ -43,4 +43,16 @@ def off_chords(points, corners, out):
     """Distance of each of points (m, 3) from the segment that starts at its corner, of (m + 1, 3), into out (m,)."""
     for i in range(len(points)):
         out[i] = off_segment(points, i, corners, i, i + 1)
+    return 0
+
+
+@compiled("f8[:,:], f8[:,:], f8[:]")
+def farthest(points, line, out):
+    """The largest distance of `points` (m, 3) from the polyline `line` (k, 3), k >= 2, into out (1,)."""
+    out[0] = 0.0
+    for i in range(len(points)):
+        least = math.inf
+        for k in range(len(line) - 1):
+            least = min(least, off_segment(points, i, line, k, k + 1))
+        out[0] = max(out[0], least)
     return 0

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lib.visibility.framing import framed
 from lib.visibility.tracer import Tracer
 
 
@@ -26,15 +27,7 @@ def prepare(V, F):
 
     Raises ValueError for a vertex that is not finite or an index out of range.
     """
-    V, F = np.asarray(V, dtype=np.float64).reshape(-1, 3), np.asarray(F, dtype=np.int64).reshape(-1, 3)
-    if not np.isfinite(V).all():
-        raise ValueError("V: not finite")
-    centre, scale = np.zeros(3), 1.0
-    if len(F):
-        if F.min() < 0 or F.max() >= len(V):
-            raise ValueError(f"F: indices {F.min()} to {F.max()}, expected 0 to {len(V) - 1}")
-        low, high = V[F].min((0, 1)), V[F].max((0, 1))
-        centre, scale = (low + high) / 2, max(float((high - low).max()), np.finfo(float).tiny)
+    V, F, centre, scale = framed(V, F)
     return Mesh(V, F, centre, scale, Tracer((V - centre) / scale, F))
 
 

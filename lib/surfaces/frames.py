@@ -60,8 +60,7 @@ def frame(surface, uv, face=None):
 def density(surface, uv, face=None):
     """Area of the surface over area of its map at uv (n, 2): (n,)."""
     if not isinstance(surface, Mesh):
-        _, S_u, S_v = evaluate.evaluate(whole(surface), uv[:, 0], uv[:, 1])
-        return np.linalg.norm(np.cross(S_u, S_v), axis=1)
+        return evaluate.densities(whole(surface), uv[:, 0], uv[:, 1])[:, 0]
     corner, place = surface.V[surface.F[face]], surface.uv[face]
     area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
     e, f = place[:, 1] - place[:, 0], place[:, 2] - place[:, 0]

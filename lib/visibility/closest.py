@@ -14,6 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lib.visibility.framing import framed
+
 
 @dataclass(frozen=True)
 class Mesh:
@@ -32,15 +34,9 @@ def prepare(V, F):
     V : (n_v, 3) float64, any unit. F : (n_f, 3) int, n_f = 0 allowed: nothing is hit then.
     Raises ValueError on another shape, a non-finite vertex or an index out of range.
     """
-    V, F = np.asarray(V, float).reshape(-1, 3), np.asarray(F, np.int64).reshape(-1, 3)
-    if not np.isfinite(V).all():
-        raise ValueError("V: not finite")
+    V, F, centre, scale = framed(V, F)
     if not len(F):
-        return Mesh(V, F, np.zeros(3), 1.0, None)
-    if F.min() < 0 or F.max() >= len(V):
-        raise ValueError(f"F: indices {F.min()} to {F.max()}, expected 0 to {len(V) - 1}")
-    low, high = V[F].min((0, 1)), V[F].max((0, 1))
-    centre, scale = (low + high) / 2, max(float((high - low).max()), np.finfo(float).tiny)
+        return Mesh(V, F, centre, scale, None)
     core, geometry = _open3d()
     handle = geometry.RaycastingScene()
     handle.add_triangles(core.Tensor(((V - centre) / scale).astype(np.float32)), core.Tensor(F.astype(np.uint32)))
