@@ -59,3 +59,12 @@ def test_nothing_visible_or_nothing_hidden():
     assert not push_pull(value, np.ones((2, 2), bool)).any()
     assert not one_deep(value, np.ones((2, 2), bool)).any()
     assert np.array_equal(one_deep(value, np.zeros((2, 2), bool)), value)
+
+
+def test_what_lies_between_visible_texels_is_filled_bilinearly():
+    """Half the size holds 0 and 3 at the middles of two texels each: a quarter and three quarters of the way."""
+    for text in ("0 . . 3", "0 / . / . / 3"):
+        value, hidden = drawn(text)
+        assert push_pull(value, hidden)[..., 0].ravel().tolist() == [0, 0.75, 2.25, 3]
+    value, hidden = drawn("0 . . 4 / . . . . / . . . . / 8 . . 12")
+    assert push_pull(value, hidden)[1:3, 1:3, 0].tolist() == [[3, 5], [7, 9]]

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lib.radiosity.quality import gather_rays, quality
+from lib.radiosity.quality import first_level, gather_rays, quality
 from lib.radiosity.refine import rays_for
 from lib.radiosity.thresholds import own_share, thresholds
 
@@ -101,3 +101,8 @@ def test_a_sample_never_gets_no_ray():
     for K in (16.0, 32.0, 960.0):
         for tiny in (1.0, np.full(3, 1e-3)):
             assert (rays_for(cells, contrast, np.full(3, K), tiny) >= 16).all()
+
+
+def test_trees_begin_a_level_coarser_for_half_the_side():
+    assert first_level([2.0, 0.25, 0.125, 0.0625, 0.03, 1e-6, 0.0], 4).tolist() == [4, 4, 3, 2, 1, 1, 1]
+    assert first_level(0.125, 3) == 2
