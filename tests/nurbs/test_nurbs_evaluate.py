@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from lib.nurbs import model
-from lib.nurbs.evaluate import basis, evaluate, evaluate_grid, frame, frame_grid, normal, point, span
+from lib.nurbs.evaluate import basis, densities, evaluate, evaluate_grid, frame, frame_grid, normal, point, span
 from lib.nurbs.surface import NurbsSurface, bezier, bilinear, from_points
-from tests.shapes import cylinder, disc, extruded, revolved, sphere, triangle
+from tests.shapes import cylinder, disc, extruded, rectangle, revolved, sphere, triangle
 from tests.tolerances import EXACT, LIMIT
 
 BOOK_KNOTS = np.array([0, 0, 0, 1, 2, 3, 4, 4, 5, 5, 5], dtype=float)  # The NURBS Book, p. 68
@@ -242,3 +242,13 @@ def test_many_points_are_evaluated_in_pieces():
 def test_no_points_are_no_points():
     assert point(sphere(), np.zeros(0), np.zeros(0)).shape == (0, 3)
     assert normal(sphere(), np.zeros(0), np.zeros(0)).shape == (0, 3)
+
+
+def test_densities_are_the_lengths_of_derivatives_and_of_their_product():
+    turned = np.linalg.qr(np.random.default_rng(3).normal(size=(3, 3)))[0]
+    u, v = np.random.default_rng(4).uniform(0.05, 0.95, (2, 50))
+    for surface in (sphere(), rectangle([1, 2, 3], *(turned[:2] * [[2], [5]]))):
+        _, S_u, S_v = evaluate(surface, u, v)
+        expected = [np.linalg.norm(x, axis=1) for x in (np.cross(S_u, S_v), S_u, S_v)]
+        assert densities(surface, u, v) == pytest.approx(np.stack(expected, axis=1), rel=1e-12)
+    assert densities(surface, u, v) == pytest.approx(np.tile([10, 2, 5], (50, 1)), rel=1e-12)
