@@ -5,6 +5,7 @@ import os
 import shlex
 import subprocess
 import sys
+import threading
 import uuid
 
 sys.path.insert(0, workflow.basedir)
@@ -93,7 +94,19 @@ onstart:
     warm_start.start()
 
 
+def end_timers():
+    """End those of Snakemake's limit of jobs a second: they hold a finished run for a second more, for nothing."""
+    for thread in threading.enumerate():
+        if isinstance(thread, threading.Timer):
+            thread.cancel()
+
+
+onsuccess:
+    end_timers()
+
+
 onerror:
+    end_timers()
     print(*stopped(STAGE, os.environ["BAKE_RUN"]), sep="\n", file=sys.stderr)  # again, below what Snakemake had to say
 
 
