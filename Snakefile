@@ -24,6 +24,8 @@ min_version("9.0")
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # jobs are the parallelism; idle threads cost start-up
 os.environ["PYTHONPATH"] = os.pathsep.join([workflow.basedir, *filter(None, [os.environ.get("PYTHONPATH")])])
+FIRST = 1  # priority of what others wait for, before the levels of detail, which wait for nothing but the geometry
+MOST_CORES = 8  # of jobs that nothing can run beside, with --cores as many; more share too little of the work
 RUN = shlex.join([sys.executable, "-I", "-S", os.path.join(workflow.basedir, "stages")])  # stages/__main__.py
 
 
@@ -31,6 +33,7 @@ def read_scene(folder, overrides, results_root):
     """Read the scene in the process that runs the jobs: it needs the same libraries later, this one needs none."""
     warm_start.start()
     told = ["--scene", folder, "--overrides", json.dumps(overrides, default=str), "--results", results_root]
+    told += ["--threads", str(min(MOST_CORES, workflow.resource_settings.cores or 1))]
     if subprocess.run([*shlex.split(RUN), "preflight", *told]).returncode:
         sys.exit(1)
 
@@ -128,11 +131,12 @@ rule import_scene:
     log:
         text=f"{STAGE}/import_scene/log.txt",
         cost=f"{STAGE}/import_scene/cost.json",
+    threads: MOST_CORES
     params:
         *code("import_scene"),
         slice=scene.slices["geometry"],
     shell:
-        "{RUN} import_scene --scene-slice {params.slice:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
+        "{RUN} import_scene --scene-slice {params.slice:q} --out {output:q} --log {log.text:q} --cost {log.cost:q} --threads {threads}"
 
 
 rule tessellate:
@@ -143,12 +147,13 @@ rule tessellate:
     log:
         text=f"{STAGE}/tessellate/log.txt",
         cost=f"{STAGE}/tessellate/cost.json",
+    threads: MOST_CORES
     params:
         *code("tessellate"),
         settings=SETTINGS["tessellate"],
     shell:
         "{RUN} tessellate --scene {input.scene:q} --settings {params.settings:q} --out {output:q}"
-        " --log {log.text:q} --cost {log.cost:q}"
+        " --log {log.text:q} --cost {log.cost:q} --threads {threads}"
 
 
 rule sample:
@@ -160,6 +165,7 @@ rule sample:
     log:
         text=f"{STAGE}/sample/log_{{c}}.txt",
         cost=f"{STAGE}/sample/cost_{{c}}.json",
+    priority: FIRST
     params:
         *code("sample"),
         settings=SETTINGS["sample"],
@@ -180,6 +186,7 @@ rule shoot:
     log:
         text=f"{STAGE}/shoot/log.txt",
         cost=f"{STAGE}/shoot/cost.json",
+    priority: FIRST
     params:
         *code("shoot"),
         settings=SETTINGS["shoot"],
@@ -201,6 +208,7 @@ rule refine_direct:
     log:
         text=f"{STAGE}/refine/log_direct_{{c}}.txt",
         cost=f"{STAGE}/refine/cost_direct_{{c}}.json",
+    priority: FIRST
     params:
         *code("refine"),
         settings=SETTINGS["refine"],
@@ -222,6 +230,7 @@ rule refine_indirect:
     log:
         text=f"{STAGE}/refine/log_indirect_{{c}}.txt",
         cost=f"{STAGE}/refine/cost_indirect_{{c}}.json",
+    priority: FIRST
     params:
         *code("refine"),
         settings=SETTINGS["refine"],
@@ -243,6 +252,7 @@ rule balance_resample:
     log:
         text=f"{STAGE}/balance_resample/log_{{c}}.txt",
         cost=f"{STAGE}/balance_resample/cost_{{c}}.json",
+    priority: FIRST
     params:
         *code("balance_resample"),
         settings=SETTINGS["balance_resample"],
@@ -263,6 +273,7 @@ rule apply_base_texture:
     log:
         text=f"{STAGE}/apply_base_texture/log.txt",
         cost=f"{STAGE}/apply_base_texture/cost.json",
+    priority: FIRST
     params:
         *code("apply_base_texture"),
         settings=SETTINGS["apply_base_texture"],
@@ -285,6 +296,7 @@ rule budget_reduce:
     log:
         text=f"{STAGE}/budget_reduce/log.txt",
         cost=f"{STAGE}/budget_reduce/cost.json",
+    priority: FIRST
     params:
         *code("budget_reduce"),
         settings=SETTINGS["budget_reduce"],
@@ -304,6 +316,7 @@ if scene.has_meshes:
         log:
             text=f"{STAGE}/thin_meshes/log.txt",
             cost=f"{STAGE}/thin_meshes/cost.json",
+        priority: FIRST
         params:
             *code("thin_meshes"),
         shell:

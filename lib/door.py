@@ -1,8 +1,8 @@
 """The frame every stage's `main` hangs in: arguments, log, cost, and plain errors on the terminal.
 
 A stage is `main(argv) = run(__doc__, arguments, body, argv)`: `arguments(parser)` names its files and settings,
-`body(args, cost)` loads, calls and saves.  Every stage takes `--log FILE` (messages, beside the result) and
-`--cost FILE` (seconds, memory, rays as JSON).
+`body(args, cost)` loads, calls and saves.  Every stage takes `--log FILE` (messages, beside the result),
+`--cost FILE` (seconds, memory, rays as JSON) and `--threads N` (see lib.forks).
 """
 
 import argparse
@@ -16,6 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from lib import forks
 from lib.formats.artefact import ArtefactError, read_json, write_json
 from lib.refusal import Refusal
 
@@ -108,10 +109,12 @@ def run(doc, arguments, body, argv=None):
     arguments(parser)
     parser.add_argument("--log", metavar="FILE", help="messages, also printed to the terminal")
     parser.add_argument("--cost", metavar="FILE", help="JSON: seconds, memory and rays of this job")
+    parser.add_argument("--threads", type=int, default=1, metavar="N", help="cores it may use, where it can use several")
     args = parser.parse_args(argv)
     cost = Cost(stage=Path(sys.modules[body.__module__].__file__ or "stage").stem)
     log = _Log(args.log)
     _open_logs.append(log)
+    cores = forks.allow(args.threads)
     try:
         body(args, cost)
     except (Refusal, ArtefactError) as error:
@@ -126,6 +129,7 @@ def run(doc, arguments, body, argv=None):
         log.add(traceback.format_exc())
         raise
     finally:
+        forks.allow(cores)
         _open_logs.pop()
         if cost.stopped and args.cost:
             with suppress(ArtefactError):  # the disk may be what stopped it

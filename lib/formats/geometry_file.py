@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 from urllib.parse import unquote
 
+from lib import forks
 from lib.formats.mistakes import Mistakes
 from lib.formats.patches import Report
 from lib.refusal import refusal
@@ -43,7 +44,8 @@ def read(path, file, name, only=None, trimmed="keep", root=None, cache=None):
     content = geometry_cache.load(cache, key)
     if content is None:
         content = _read(path, file, name, only, trimmed, root)
-        measured = [replace(patch, area=area(patch.surface)) for patch in content.patches]
+        areas = forks.mapped(lambda patch: area(patch.surface), content.patches)
+        measured = [replace(patch, area=own) for patch, own in zip(content.patches, areas, strict=True)]
         content = replace(content, patches=measured)
         geometry_cache.save(cache, key, content)
     return content

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lib import forks
 from lib.formats import geometry_file, names, scene_geometry
 from lib.formats.mistakes import listed
 from lib.formats.scene import Scene
@@ -130,20 +131,26 @@ def with_charts(placed, entries):
     from lib.surfaces import charts  # xatlas, for meshes alone
 
     scale = tessellate.frame([one.surface for one in placed])[1]
-    made, out, refused = {}, {}, {}
+    asked, out, refused = {}, {}, {}
     for one in meshes:
         size, entry, mesh = float(np.cbrt(abs(np.linalg.det(one.M[:3, :3])))), entries[one.entry], one.part.surface
         shape = (entry["file"], one.part.shape) if one.part.shape else id(one.part)
         key = shape, round(size, 12), round(area(mesh), 12), entry.get("uv", "charts")
-        if key not in made:
-            texel = finest_cell(one.area, scale) / size
-            own = charts.own_charts(mesh, texel) if key[-1] == "own" else None
-            made[key] = own or charts.charted(mesh, texel), key[-1] == "own" and own is None
-        if one.front is None:
-            atlas, is_refused = made[key]
-            if is_refused:
-                refused.setdefault(entry["file"], []).append(one.name)
-            out[one.name] = transformed(replace(mesh, uv=atlas.uv, chart=atlas.chart, level=atlas.level), one.M)
+        asked.setdefault(key, (mesh, finest_cell(one.area, scale) / size, []))[2].append(one)
+
+    def atlas(of):
+        mesh, texel, _ = asked[of]
+        own = charts.own_charts(mesh, texel) if of[-1] == "own" else None
+        return own or charts.charted(mesh, texel), of[-1] == "own" and own is None
+
+    largest_first = sorted(asked, key=lambda of: -len(asked[of][0].F))
+    for of, (laid, is_refused) in zip(largest_first, forks.mapped(atlas, largest_first, few=1), strict=True):
+        for one in asked[of][2]:
+            if one.front is None:
+                if is_refused:
+                    refused.setdefault(entries[one.entry]["file"], []).append(one.name)
+                flat = replace(one.part.surface, uv=laid.uv, chart=laid.chart, level=laid.level)
+                out[one.name] = transformed(flat, one.M)
     placed = [
         replace(one, surface=out[one.front or one.name]) if isinstance(one.surface, Mesh) else one for one in placed
     ]

@@ -6,10 +6,12 @@ SubDs and lights without an area are left out and counted.
 
 from collections import Counter
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import rhino3dm
 
+from lib import forks
 from lib.formats import names, threedm_materials
 from lib.formats.mistakes import listed
 from lib.formats.patches import MAX_PATCHES, GeometryFile, Patch, is_selected
@@ -36,6 +38,7 @@ _PLURAL = {
     "block reference without a definition": "block references without a definition",
     "extrusion without faces": "extrusions without faces",
 }  # fmt: skip
+NEXT = 8  # faces made one after the other by one process, since they share edges
 TRIMMED = (
     "is a trimmed face; `trimmed: keep` reads it, `trimmed: skip` leaves trimmed faces out, `only` selects layers and "
     "objects"
@@ -99,18 +102,20 @@ class _Part:
 
 def _patches(parts, materials, report, only, trimmed):
     """Patches of the selected parts, and the numbers of the trimmed ones that are skipped."""
-    patches, left_out = [], []
+    chosen, patches, left_out = [], [], []
     for number, part in enumerate(parts, 1):
         labels = (*part.item.labels, str(number), names.padded(number, len(parts)))
         if not is_selected(labels, only):
             continue
         if not part.is_whole and trimmed == "skip":
             left_out.append(number)
-            continue
-        if not part.is_whole and trimmed == "refuse":
+        elif not part.is_whole and trimmed == "refuse":
             report.add(f"{TRIMMED} (it is on layer {part.item.layer})", number)
-            continue
-        surface = report.surface(lambda part=part: _placed(part, trimmed == "skip"), number)
+        else:
+            chosen.append((number, part, labels))
+    made = _made([part for _, part, _ in chosen], trimmed == "skip")
+    for (number, part, labels), surface in zip(chosen, made, strict=True):
+        surface = report.surface(surface, number)
         if surface is not None:
             if isinstance(part.item.geometry, rhino3dm.Mesh) and len(part.item.geometry.VertexColors):
                 report.coloured.append(report.of(number))
@@ -118,6 +123,33 @@ def _patches(parts, materials, report, only, trimmed):
             key = materials.key(part.item.material) if part.material is None else part.material
             patches.append(Patch(number, surface, part.flip ^ bool(mirrored), labels, key, part.solid))
     return patches, left_out
+
+
+def _made(parts, plain):
+    """Functions that return the surface of each part, or raise what was wrong with it; faces of bodies are made here,
+    by several processes.
+    """
+    faces = [k for k, part in enumerate(parts) if not isinstance(part.item.geometry, rhino3dm.Mesh)]
+    out = [partial(_placed, part, plain) for part in parts]  # meshes are kept, so that references to one share it
+    for k, made in zip(faces, forks.mapped(lambda k: _outcome(out[k]), faces, together=NEXT), strict=True):
+        out[k] = made
+    return out
+
+
+def _outcome(make):
+    """What `make` returns or raises, as a function that can be sent."""
+    try:
+        return partial(_same, make())
+    except ValueError as error:
+        return partial(_raised, error)
+
+
+def _same(surface):
+    return surface
+
+
+def _raised(error):
+    raise error
 
 
 def _placed(part, plain):

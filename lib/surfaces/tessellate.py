@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from lib import forks
 from lib.nurbs import borders as find_borders
 from lib.nurbs.cut import WholePieces
 from lib.nurbs.facets import has_area
@@ -87,8 +88,9 @@ def is_whole(surfaces):
 
 def shapes(surfaces, takes_part):
     """Measure the surfaces; takes_part (n,) bool: those that may be part of a closed shell of whole surfaces."""
-    is_closed = np.array([measure.is_closed(s) for s in surfaces]).reshape(-1, 2)
-    is_collapsed = np.array([measure.collapsed_sides(s) for s in surfaces]).reshape(-1, 4)
+    facts = forks.mapped(_facts, surfaces)
+    closed, collapsed, areas, extents, planar = zip(*facts, strict=True) if facts else ((),) * 5
+    is_closed, is_collapsed = np.array(closed).reshape(-1, 2), np.array(collapsed).reshape(-1, 4)
     whole = np.flatnonzero(is_whole(surfaces))
     border, shell = np.empty((0, 5), dtype=np.int32), np.full(len(surfaces), -1, dtype=np.int32)
     if whole.size:
@@ -96,15 +98,17 @@ def shapes(surfaces, takes_part):
         own = [surfaces[s] for s in whole]
         border, shell[whole] = find_borders.find(own, is_closed[whole], is_collapsed[whole], takes_part)
         border[:, [0, 2]] = whole[border[:, [0, 2]]]
-    sizes = np.array([(measure.area(s), *measure.extent(s)) for s in surfaces]).reshape(-1, 3)
-    return Shapes(
-        sizes[:, 0].copy(),
-        sizes[:, 1:].copy(),
-        np.array([measure.is_planar(s) for s in surfaces]),
-        is_closed,
-        is_collapsed,
-        border,
-        shell,
+    extent = np.array(extents).reshape(-1, 2)
+    return Shapes(np.array(areas), extent, np.array(planar), is_closed, is_collapsed, border, shell)
+
+
+def _facts(surface):
+    return (
+        measure.is_closed(surface),
+        measure.collapsed_sides(surface),
+        measure.area(surface),
+        measure.extent(surface),
+        measure.is_planar(surface),
     )
 
 

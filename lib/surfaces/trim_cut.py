@@ -4,6 +4,7 @@ from copy import copy
 
 import numpy as np
 
+from lib import forks
 from lib.nurbs import lines as find_lines
 from lib.nurbs.cut import amended
 from lib.nurbs.evaluate import normal
@@ -25,7 +26,7 @@ class TrimmedPieces:
     def __init__(self, surfaces, known, lattice=None):
         self.surfaces, self.known = surfaces, known
         each = zip(surfaces, known.is_closed, known.is_collapsed, strict=True)
-        demands = [find_lines.demand(s.base, c, p) for s, c, p in each]
+        demands = forks.mapped(lambda one: find_lines.demand(one[0].base, *one[1:]), each)
         for s, along in (lattice or {}).items():
             for d in (0, 1):
                 demands[s] = find_lines.with_lines(demands[s], d, along[d])
@@ -116,18 +117,27 @@ class _Job:
         borders = self.pieces.borders
         for attempt in range(PATIENCE + 1):
             keep, unfit = borders.kept(self.at_place), []
-            for s, surface in enumerate(self.pieces.surfaces):
-                first, end = borders.start[s : s + 2]
-                own = keep[first:end]
-                if self._kept[s] is not None and np.array_equal(own, self._kept[s]):
-                    continue
-                is_last = own.all() or attempt == PATIENCE
-                try:
-                    self.patches[s] = triangulate(surface, own, lines[s], self.tolerance[s], rounds, is_last)
-                    self._kept[s] = own
-                except Unfit as error:
-                    unfit.append((borders.edge[first + error.points], error.share))
+            owns = np.split(keep, borders.start[1:-1])
+            again = [s for s, own in enumerate(owns) if self._kept[s] is None or not np.array_equal(own, self._kept[s])]
+            for s, made in zip(again, self._made(again, owns, lines, rounds, attempt == PATIENCE), strict=True):
+                if isinstance(made, Unfit):
+                    unfit.append((borders.edge[borders.start[s] + made.points], made.share))
+                else:
+                    self.patches[s], self._kept[s] = made, owns[s]
             if not unfit:
                 break
             self.at_place = borders.lowered(self.at_place, unfit)
         return list(self.patches)
+
+    def _made(self, numbers, owns, lines, rounds, is_last):
+        """Patches of these surfaces, or the Unfit that says which border points one wants."""
+
+        def made(s):
+            own = owns[s]
+            try:
+                surface = self.pieces.surfaces[s]
+                return triangulate(surface, own, lines[s], self.tolerance[s], rounds, is_last or own.all())
+            except Unfit as error:
+                return error
+
+        return forks.mapped(made, numbers)
