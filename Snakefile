@@ -62,7 +62,7 @@ envvars:  # goes with jobs to other machines
 
 OUT = f"results/{scene.name}"
 STAGE = f"{OUT}/stages"
-SLICES = rule_settings(scene.settings, scene.warnings, scene.tolerances, scene.reconstruction)
+SLICES = rule_settings(scene.settings, scene.warnings, scene.tolerances, scene.reconstruction, scene.mesh_cells)
 SETTINGS = short(SLICES, f"{OUT}/settings")
 HAS_MAP = [role != "cast_only" and not black for role, black in zip(scene.roles, scene.is_black)]
 MAPPED = [file for file, has_map in zip(scene.files, HAS_MAP) if has_map]

@@ -109,7 +109,9 @@ def run(doc, arguments, body, argv=None):
     arguments(parser)
     parser.add_argument("--log", metavar="FILE", help="messages, also printed to the terminal")
     parser.add_argument("--cost", metavar="FILE", help="JSON: seconds, memory and rays of this job")
-    parser.add_argument("--threads", type=int, default=1, metavar="N", help="cores it may use, where it can use several")
+    parser.add_argument(
+        "--threads", type=int, default=1, metavar="N", help="cores it may use, where it can use several"
+    )
     args = parser.parse_args(argv)
     cost = Cost(stage=Path(sys.modules[body.__module__].__file__ or "stage").stem)
     log = _Log(args.log)

@@ -1,7 +1,7 @@
 """The same work on many independent items by several processes: forks of this one, which know all that it knows.
 
-A stage may use as many cores as its rule is given (`allow`, by lib.door).  Items are handed out one by one, in order, to
-whoever is free; what comes back hangs on the item alone, so the number of processes changes no result.  Not for work
+A stage may use as many cores as its rule is given (`allow`, by lib.door).  Items are handed out one by one, in order,
+to whoever is free; what comes back hangs on the item alone, so the number of processes changes no result.  Not for work
 that starts threads before: a fork has none of them.
 """
 

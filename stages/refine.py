@@ -5,7 +5,8 @@ reads   scene.npz, casters.npz, solution.npz, and chunk_<c>.npz of sample (direc
 writes  direct_<c>.npz or indirect_<c>.npz          (lib.formats.trees)
 
 settings: seed, tolerance, tolerances, relative_to, t_direct, t_indirect, base_indirect, top, gather_rays, shadow_rays,
-smallest_cell, chart_effort, bounces
+smallest_cell, chart_effort, chart_coarser,
+bounces
 """
 
 import numpy as np
@@ -39,7 +40,7 @@ def body(args, cost):
     solved, chosen = solution.load(args.solution), args.settings
     own = own_share(world.scene.names, chosen)
     tau = thresholds(solved, own, args.half, chosen)
-    effort = efforts(world, own, chosen["chart_effort"])
+    effort = efforts(world, own, chosen["chart_effort"], chosen["chart_coarser"])
     if args.half == "direct":
         x = samples.load(args.samples)
         done, spared = refine_direct(

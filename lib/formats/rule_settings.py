@@ -21,13 +21,14 @@ MOST_WARNINGS = 100  # told the report
 LONGEST = 8000  # characters of a slice in a command line, which holds 128 kB in all
 
 
-def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None):
+def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None, mesh_cells=0):
     """{stage or shared slice: JSON text} from the resolved settings; sorted keys, so that equal slices are equal texts.
 
     tolerances, reconstruction : {surface: value} of the surfaces that ask for their own
+    mesh_cells : finest cells on all meshes
     """
     bake = settings["bake"]
-    q = chosen_quality(bake)
+    q = chosen_quality(bake, mesh_cells)
     light = {"seed": bake["seed"], "bounces": bake["bounces"]}
     threshold = {
         "tolerance": bake["tolerance"],
@@ -36,7 +37,7 @@ def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None):
         "t_direct": q["t_direct"],
         "t_indirect": q["t_indirect"],
     }
-    finer = "top", "gather_rays", "shadow_rays", "base_indirect", "smallest_cell", "chart_effort"
+    finer = "top", "gather_rays", "shadow_rays", "base_indirect", "smallest_cell", "chart_effort", "chart_coarser"
     refine = {name: q[name] for name in finer}
     sample = {name: q[name] for name in ("n_elements", "rays_per_element", "base_direct", "first_shadow_rays")}
     slices = {
@@ -98,9 +99,9 @@ def _text(content):
     return re.sub(r"\{(?=\s*[.\w])", r"\\u007b", json.dumps(content, sort_keys=True))
 
 
-def chosen_quality(bake):
+def chosen_quality(bake, mesh_cells=0):
     """Quality of the tolerance as a dict, with what the user fixed by hand laid over it."""
-    q = quality(bake["tolerance"], bake["max_level"]).as_dict()
+    q = quality(bake["tolerance"], bake["max_level"], mesh_cells).as_dict()
     by_hand = {"n_elements": "elements", "rays_per_element": "rays_per_element", "gather_rays": "gather_rays"}
     q |= {name: bake[key] for name, key in by_hand.items() if bake[key] != "auto"}
     if bake["shadow_rays"] != "auto":

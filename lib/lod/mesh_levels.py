@@ -1,7 +1,8 @@
 """Levels of detail of triangle meshes: how far they may be thinned for a tolerance or a count.
 
 What collapses cost is found once (`Ladder.known`), before any level is asked for: levels all the way down are measured,
-at most NEAR times apart where distances matter.  A level is then most often one of these and only has to be made.
+at most ROUGH times apart where distances matter.  For a tolerance a few more between two of these are, until it is met
+by a level with NEAR times as many triangles as needed.
 """
 
 from dataclasses import dataclass, replace
@@ -13,9 +14,11 @@ from lib.lod.thinned import Thinned
 from lib.surfaces.pieces import pieces
 from lib.surfaces.rows import numbered
 
-STEP = 2.0  # times fewer triangles, from one measured level to the next
+STEP = 4.0  # times fewer triangles, from one measured level to the next
+ROUGH = 2.0  # as many times more triangles are near enough in the survey; who asks for a level measures a few more
 NEAR = 1.1  # times more triangles than needed is near enough
-SPARE = 0.005  # of all meshes' triangles: that many more than needed, over all groups, are near enough too
+SPARE = 0.005  # of all meshes' triangles: that many more than needed, over all groups, are near enough too ...
+ROUGHLY = 8  # ... and as many times that in the survey
 FINE, COARSE = 1e-5, 1e-2  # frames; for tolerances beyond, levels are measured when they are asked for
 ALIKE = 1.02  # levels whose distances differ by less have none between them
 SLIDE = 8.0  # a texture may slide as many tolerances
@@ -120,16 +123,16 @@ class Ladder:
         pairs = list(zip(steps[:-1], steps[1:], strict=True))
         while pairs:
             i, j = pairs.pop()
-            if self._is_near(i, j) or self._is_idle(i, j):
+            if self._is_near(i, j, ROUGH, ROUGHLY) or self._is_idle(i, j):
                 continue
             k = self._thin.step(int(np.sqrt(self.counts[i] * self.counts[j])))
             if k not in self._measured:
                 self._measure(k)
                 pairs += [(i, k), (k, j)]
 
-    def _is_near(self, i, j):
+    def _is_near(self, i, j, near=NEAR, spares=1):
         """Are the triangles after i collapses few more than after j?"""
-        return self.counts[i] <= max(NEAR * self.counts[j], self.counts[j] + self.spare)
+        return self.counts[i] <= max(near * self.counts[j], self.counts[j] + spares * self.spare)
 
     def _is_idle(self, i, j):
         """Is no tolerance likely to ask for a level between those after i and j collapses?"""

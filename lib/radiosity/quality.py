@@ -18,7 +18,9 @@ import numpy as np
 
 ELEMENTS = 8000  # lookups then bound the error near 0.2 % in a room with a teapot; `elements` asks for more
 ROUGH = 0.01  # tolerance above which meshes get less: there the width of their cells decides, not the noise in them
-CHART_EFFORT = 0.5  # measured in a room of 330,000 triangles: 0.6 % more error for half the shadow rays
+CHART_EFFORT = 0.5  # measured in a room of 330,000 triangles: 0.2 % more error for two thirds of the rays
+FEW_CELLS = 2e5  # of all meshes: of more, a first look leaves the finest out, so that it takes about as long
+MOST_COARSER = 2  # levels: farther up, charts begin to share cells
 LOOKUPS = 1.2e-3  # of the scene's mean light: error that the elements leave in bounced light, measured
 GATHER_RAYS = 720  # at a tolerance of 1 %
 LARGE = 0.25  # root cells from this side on, in the scene's largest side, start their trees in full
@@ -29,8 +31,9 @@ class Quality:
     """n_elements in the scene and rays_per_element for their rows; gather_rays K; shadow_rays (n0, n1), the same for
     every tolerance at first_shadow_rays, which the elements see;
     thresholds t_direct, t_indirect in units of the scene's mean irradiance; levels of the two trees (base, top), and
-    the smallest_cell that they divide, in units of the scene's largest side; chart_effort, the share of the first
-    shadow rays that samples on meshes get (below 1 they are not doubted, see lib.radiosity.refine)."""
+    the smallest_cell that they divide, in units of the scene's largest side; chart_effort, the share of the rays
+    that samples on meshes get (below 1 they are not doubted, see lib.radiosity.refine), and chart_coarser, levels by
+    which the maps of meshes end above the finest cells of their atlas."""
 
     n_elements: int
     rays_per_element: int
@@ -44,20 +47,23 @@ class Quality:
     top: int
     smallest_cell: float
     chart_effort: float
+    chart_coarser: int
 
     def as_dict(self):
         """Plain dict for JSON."""
         return asdict(self)
 
 
-def quality(tolerance, max_level=8):
-    """Quality for a relative RMS error `tolerance` (0.002 .. 0.1) with trees at most `max_level` deep.
+def quality(tolerance, max_level=8, mesh_cells=0):
+    """Quality for a relative RMS error `tolerance` (0.002 .. 0.1) with trees at most `max_level` deep, in a scene whose
+    meshes have `mesh_cells` finest cells in all.
 
     Elements, their rows and their first shadow rays are the same for every tolerance: a changed one leaves the solved
     light as it is.
     """
     ratio = tolerance / 0.01
     rays = _multiple_of_16(gather_rays(GATHER_RAYS, ratio), 16, 8192)
+    coarser = int(np.clip(np.ceil(np.log(max(mesh_cells, 1) / FEW_CELLS) / np.log(4)), 0, MOST_COARSER))
     n1 = 32 if tolerance >= 0.015 else 64 if tolerance >= 0.0075 else 256
     return Quality(
         n_elements=ELEMENTS,
@@ -71,7 +77,8 @@ def quality(tolerance, max_level=8):
         base_indirect=3,
         top=max_level,
         smallest_cell=1e-3 * min(1.0, max(0.5, ratio / 0.8)),
-        chart_effort=CHART_EFFORT if tolerance > ROUGH else 1.0,
+        chart_effort=1.0 if tolerance <= ROUGH else CHART_EFFORT if not coarser else CHART_EFFORT / 2,
+        chart_coarser=0 if tolerance <= ROUGH else coarser,
     )
 
 

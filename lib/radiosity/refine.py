@@ -1,6 +1,7 @@
 """Refinement of all trees of a chunk together, level by level: every new sample of a level is measured in one batch."""
 
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,19 @@ LEAST_RAYS = 32  # or half of what a large cell gets
 USUAL_CONTRAST = 0.6
 AVERAGED = 0.8  # between samples, interpolation averages their noise
 SMOOTH = 0.25  # dividing a cell once more leaves a quarter of the departure of a smooth field
+
+
+class Effort(NamedTuple):
+    """What surfaces (n,) are worth: share of the usual rays, and levels by which their trees end above the cells of an
+    atlas."""
+
+    share: np.ndarray
+    coarser: np.ndarray
+
+
+def full(n):
+    """The Effort of n surfaces that get all there is."""
+    return Effort(np.ones(n), np.zeros(n, dtype=np.int64))
 
 
 def refine(world, trees, sample, seed, tau, top, recheck=None):
@@ -57,23 +71,25 @@ def needed_of(world, tree, s, at):
     return tuple(axis[wanted] for axis in at)
 
 
-def tree_of(world, s, base, smallest):
-    """An empty Quadtree of surface s."""
+def tree_of(world, s, base, smallest, coarser):
+    """An empty Quadtree of surface s, at least `base` deep and `coarser` levels less than its atlas."""
     cover = None if world.domain(s) is None else partial(world.cover, s)
-    return Quadtree(world.lattices[s], base, world.channels, world.side(s), cover, world.finest(s), smallest)
+    finest = None if world.finest(s) is None else max(base, world.finest(s) - int(coarser))
+    return Quadtree(world.lattices[s], base, world.channels, world.side(s), cover, finest, smallest)
 
 
 def refine_direct(world, base, seed, tau, top, shadow_rays, smallest=SMALLEST_CELL, effort=None):
     """Direct trees from their base lattices.
 
-    base : {surface: (value (h, w, C), hidden, noise, level)}; effort : as efforts has it, None for all.
+    base : {surface: (value (h, w, C), hidden, noise, level)}; effort : an Effort, None for all.
     Returns {surface: Quadtree} and counts of spared rays.
 
-    A surface of less effort gets that share of the first shadow rays, and none for doubts.
+    A surface of less effort gets that share of the shadow rays, and none for doubts.
     """
     trees, spared = {}, np.zeros(3, dtype=np.int64)
+    effort = effort or full(world.n)
     for s, (value, hidden, noise, level) in base.items():
-        trees[s] = tree_of(world, s, level, smallest)
+        trees[s] = tree_of(world, s, level, smallest, effort.coarser[s])
         own = trees[s].wanted()
         trees[s].put(own, value[own], hidden[own], noise[own], np.inf)
 
@@ -86,33 +102,34 @@ def refine_direct(world, base, seed, tau, top, shadow_rays, smallest=SMALLEST_CE
         return sample
 
     n0, n1 = shadow_rays
-    effort = np.ones(world.n) if effort is None else effort
-    whole = {s: tree for s, tree in trees.items() if effort[s] >= 1}
+    whole = {s: tree for s, tree in trees.items() if effort.share[s] >= 1}
     refine(world, whole, sampler((n0, n1)), seed, tau, top, recheck=sampler((n1, n1)))
-    for share in sorted({float(effort[s]) for s in trees if effort[s] < 1}):
-        less = {s: tree for s, tree in trees.items() if effort[s] == share}
-        refine(world, less, sampler((max(1, round(share * n0)), n1)), seed, tau, top)
+    for share in sorted({float(effort.share[s]) for s in trees if effort.share[s] < 1}):
+        less = {s: tree for s, tree in trees.items() if effort.share[s] == share}
+        refine(world, less, sampler(tuple(max(1, round(share * n)) for n in shadow_rays)), seed, tau, top)
     return trees, spared
 
 
-def efforts(world, own, chart_effort):
-    """(n,) share of the usual effort that samples of each surface are worth: chart_effort on meshes, whose cells stop
-    at those of their atlas however the light changes, but where a finer tolerance is asked; 1 elsewhere.
+def efforts(world, own, chart_effort, chart_coarser=0):
+    """The Effort that surfaces are worth: share chart_effort on meshes, whose cells stop at those of their atlas (or
+    chart_coarser levels above) however the light changes, but where a finer tolerance is asked; all elsewhere.
 
     own : (n,) of own_share
     """
     is_mesh = np.array([world.finest(s) is not None for s in range(world.n)], dtype=bool)
-    return np.where(is_mesh & (own >= 1), chart_effort, 1.0)
+    less = is_mesh & (own >= 1)
+    return Effort(np.where(less, chart_effort, 1.0), np.where(less, chart_coarser, 0))
 
 
 def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, smallest=SMALLEST_CELL, effort=None):
     """Indirect trees of `surfaces`, by gather rays through the LookupTable: {surface: Quadtree}.
 
     solution : has spread, H_element, n_u, n_v, first; K (surfaces,) gather rays
-    for a large cell of usual surroundings; effort : as efforts has it, None for all.
+    for a large cell of usual surroundings; effort : an Effort, None for all.
     """
-    effort = np.ones(world.n) if effort is None else effort
-    trees = {s: tree_of(world, s, world.base_level(s, level), smallest) for s in surfaces}
+    effort = effort or full(world.n)
+    trees = {s: tree_of(world, s, world.base_level(s, level), smallest, effort.coarser[s]) for s in surfaces}
+    K = K * effort.share
 
     def sample(points):
         n = len(points.x)
@@ -122,7 +139,7 @@ def refine_indirect(world, surfaces, table, solution, seed, tau, top, level, K, 
             np.zeros(n, np.float32),
             np.zeros(n, np.float32),
         )
-        tiny = np.where(effort[points.surface] < 1, points.cell / smallest, 1.0)
+        tiny = np.where(effort.share[points.surface] < 1, points.cell / smallest, 1.0)
         rays = rays_for(points.cell, contrast_at(points, solution), K[points.surface], tiny)
         for k in np.flatnonzero(np.bincount(rays)):  # np.unique loads numpy.ma, 0.06 s
             of = np.flatnonzero(rays == k)

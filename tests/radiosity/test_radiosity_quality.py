@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from lib.radiosity.quality import first_level, gather_rays, quality
+from lib.radiosity.quality import FEW_CELLS, first_level, gather_rays, quality
 from lib.radiosity.refine import rays_for
 from lib.radiosity.thresholds import own_share, thresholds
 
@@ -39,6 +39,14 @@ def test_the_numbers_fit_their_stages(tolerance, top):
 
 def test_meshes_get_less_above_the_standard_tolerance_alone():
     assert [quality(t).chart_effort for t in (0.002, 0.01, 0.014, 0.1)] == [1, 1, 0.5, 0.5]
+    assert [quality(t, mesh_cells=1e6).chart_effort for t in (0.002, 0.01, 0.014, 0.1)] == [1, 1, 0.25, 0.25]
+
+
+def test_large_meshes_end_coarser_above_the_standard_tolerance_alone():
+    """Four times the cells, one level more: what is left is bounded, as far as charts allow."""
+    cells = [0, FEW_CELLS, 1.01 * FEW_CELLS, 4 * FEW_CELLS, 4.01 * FEW_CELLS, 1e9]
+    assert [quality(0.014, mesh_cells=n).chart_coarser for n in cells] == [0, 0, 1, 1, 2, 2]
+    assert [quality(t, mesh_cells=1e9).chart_coarser for t in (0.002, 0.01)] == [0, 0]
 
 
 def test_rays_for_a_ratio_of_tolerances():
