@@ -11,12 +11,14 @@ this mesh.
 
 import numpy as np
 
-from lib import door
+from lib import door, forks
 from lib.formats import casters, scene
 from lib.refusal import refusal
 from lib.surfaces import tessellate
 from lib.surfaces.closed import in_closed_shell
+from lib.surfaces.frames import part_of
 
+NO_PART = np.empty((0, 3, 2)), np.empty((0, 3), dtype=bool)  # of a back, which has that of its front
 SAG, OWN_SAG = 1e-3, 2e-3  # of the frame; of the surface's own size
 
 
@@ -55,6 +57,7 @@ def make(surfaces, flip, role, sag, front=None):
     known = tessellate.shapes(surfaces, blocks)
     size = known.extent.max(axis=1)
     pieces = tessellate.Pieces(surfaces, known)
+    parts = forks.mapped(part_of, surfaces)
     patches = pieces.cut_within(np.minimum(sag, OWN_SAG * size), tessellate.SLIDE * size)
     mesh = tessellate.assemble(patches, surfaces, known)
     F, face_own = mesh.F.copy(), np.repeat(np.arange(len(own)), np.diff(mesh.face_start))
@@ -80,7 +83,18 @@ def make(surfaces, flip, role, sag, front=None):
         is_collapsed=known.is_collapsed[of],
         shell=known.shell[of],
         borders=borders,
+        **packed([parts[k] if front[s] < 0 else NO_PART for s, k in enumerate(of)]),
     )
+
+
+def packed(parts):
+    """The fields of Casters of what part_of says of each surface."""
+    sizes = np.array([[len(uv), len(border)] for uv, border in parts], dtype=np.int64).reshape(-1, 2)
+    return {
+        "part_start": np.concatenate([np.zeros((1, 2), np.int64), np.cumsum(sizes, axis=0)]),
+        "part_uv": np.concatenate([NO_PART[0], *(uv for uv, _ in parts)]),
+        "part_border": np.concatenate([NO_PART[1], *(border for _, border in parts)]),
+    }
 
 
 def main(argv=None):

@@ -6,7 +6,7 @@ import numpy as np
 
 from lib.formats import artefact
 
-KIND, VERSION = "casters", 2
+KIND, VERSION = "casters", 3
 
 
 @dataclass(frozen=True)
@@ -23,6 +23,8 @@ class Casters:
     shell (n,) int32    closed shell of whole NURBS surfaces it belongs to, or -1
     borders (m, 5) int32 [surface a, side a, surface b, side b, reversed]: sides that are the same curve at the same
     speed
+    part_start (n + 1, 2) int64 : surface s has the rows part_start[s, 0] to part_start[s + 1, 0] of part_uv, and of
+    part_border by [:, 1];  part_uv (t, 3, 2) float64, part_border (b, 3) bool : see lib.surfaces.frames.part_of
     """
 
     centre: np.ndarray
@@ -40,6 +42,14 @@ class Casters:
     is_collapsed: np.ndarray
     shell: np.ndarray
     borders: np.ndarray
+    part_start: np.ndarray
+    part_uv: np.ndarray
+    part_border: np.ndarray
+
+    def part(self, s):
+        """What lib.surfaces.frames.part_of says of surface s."""
+        (a, b), (c, d) = self.part_start[s : s + 2].T
+        return self.part_uv[a:b], self.part_border[c:d]
 
 
 def _expected(x):
@@ -59,6 +69,9 @@ def _expected(x):
         "is_collapsed": ((n, 4), np.bool_),
         "shell": ((n,), np.int32),
         "borders": ((len(x.borders), 5), np.int32),
+        "part_start": ((n + 1, 2), np.int64),
+        "part_uv": ((len(x.part_uv), 3, 2), np.float64),
+        "part_border": ((len(x.part_border), 3), np.bool_),
     }
 
 
@@ -77,6 +90,9 @@ def check(x, path="casters"):
         "borders": not len(x.borders)
         or (x.borders.min() >= 0 and x.borders[:, [0, 2]].max() < n and x.borders[:, [1, 3]].max() < 4),
     }
+    ends = [len(x.part_uv), len(x.part_border)]
+    rules["part_start"] = not x.part_start[0].any() and (np.diff(x.part_start, axis=0) >= 0).all()
+    rules["part_start: its end"] = x.part_start[-1].tolist() == ends
     for name, holds in rules.items():
         if not holds:
             raise artefact.ArtefactError(f"{path}: {name}: out of range, see lib.formats.casters")

@@ -39,7 +39,8 @@ class World:
     """What sample and refine need of a scene.
 
     scene : has names, surfaces (world units), front, flip, role, E, group, groups, is_black, glow
-    casters : has centre, scale, V, F, UV, face_surface, sag, area, extent, is_planar, is_closed, is_collapsed, shell
+    casters : has centre, scale, V, F, UV, face_surface, sag, area, extent, is_planar, is_closed, is_collapsed, shell,
+        part(s)
     """
 
     def __init__(self, scene, casters):
@@ -70,7 +71,8 @@ class World:
         if s not in self._domains:
             level = self.finest(s)
             rows, columns = self.lattices[s].cells(PLACED if level is None else level)
-            self._domains[s] = domain_of(self.surface(s), (columns, rows))
+            front = s if self.scene.front[s] < 0 else self.scene.front[s]
+            self._domains[s] = domain_of(self.surface(s), (columns, rows), self.casters.part(front))
         return self._domains[s]
 
     def finest(self, s):

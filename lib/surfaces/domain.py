@@ -12,8 +12,8 @@ from functools import cached_property
 import numpy as np
 
 from lib.surfaces.nearest import Nearest
+from lib.surfaces.point_location import PointLocation, move_in
 from lib.surfaces.rows import numbered
-from lib.visibility.tracer import Tracer
 
 INSIDE = 1e-3  # in (u, v): samples keep this distance from the border, as far as the triangles are wide enough
 SPACING = 0.5  # of a finest cell, between the places along the border that samples are moved to
@@ -33,15 +33,15 @@ class Places:
 
 
 class Domain:
-    """Point location in the triangles uv (m, 3, 2) of a surface, chart (m,) int; cells : of its finest lattice along
-    (u, v); corner (m, 3) int : numbers of their corners, the same where place and chart are, if known."""
+    """The triangles uv (m, 3, 2) of a surface, chart (m,) int, border (m, 3) bool as `borders` has it; cells : of its
+    finest lattice along (u, v)."""
 
-    def __init__(self, uv, chart, cells, corner=None):
-        self.uv = np.asarray(uv, dtype=np.float64)
-        self.chart = np.asarray(chart, dtype=np.int64)
-        self.cells, self._corner = cells, corner
-        flat = np.concatenate([self.uv.reshape(-1, 2), np.zeros((3 * len(self.uv), 1))], axis=1)
-        self._tracer = Tracer(flat, np.arange(len(flat), dtype=np.int32).reshape(-1, 3))
+    def __init__(self, uv, chart, cells, border=None):
+        self.uv = np.ascontiguousarray(uv, dtype=np.float64)
+        self.chart = np.ascontiguousarray(chart, dtype=np.int64)
+        self.cells = cells
+        self.is_border = np.ascontiguousarray(borders(self.uv, self.chart) if border is None else border)
+        self._location = PointLocation(self.uv)
 
     @cached_property
     def is_single(self):
@@ -49,21 +49,9 @@ class Domain:
         return not len(self.chart) or bool((self.chart == self.chart[0]).all())
 
     @cached_property
-    def _is_border(self):
-        """(m, 3) bool: the edge opposite to corner k of a triangle belongs to no other triangle of its chart."""
-        corner = self._corner
-        if corner is None:
-            points = np.concatenate([self.uv.reshape(-1, 2), np.repeat(self.chart, 3)[:, None]], axis=1)
-            corner = numbered(points)[0].reshape(-1, 3)
-        edge = np.stack([corner[:, [1, 2]], corner[:, [2, 0]], corner[:, [0, 1]]], axis=1).astype(np.int64)
-        edge = np.sort(edge, axis=2) @ [corner.max(initial=0) + 1, 1]
-        _, which, count = np.unique(edge, return_inverse=True, return_counts=True)
-        return (count == 1)[which].reshape(-1, 3)
-
-    @cached_property
     def _border(self):
         """Places along the border: uv (k, 2) on it, inner (k, 2) a little inside, face (k,)."""
-        face, opposite = np.nonzero(self._is_border)
+        face, opposite = np.nonzero(self.is_border)
         a, b = self.uv[face, (opposite + 1) % 3], self.uv[face, (opposite + 2) % 3]
         length = np.abs(b - a) * self.cells
         count = np.clip(np.ceil(length.max(axis=1, initial=0.0) / SPACING), 1, MOST_PLACES).astype(np.int64)
@@ -76,18 +64,9 @@ class Domain:
 
     def _moved_in(self, uv, face):
         """Places uv (n, 2) of triangles `face`, moved towards the middle where they lie within INSIDE of the border."""
-        corner = self.uv[face]
-        weight = barycentric(corner, uv)
-        side = np.linalg.norm(np.roll(corner, -1, axis=1) - np.roll(corner, 1, axis=1), axis=2)  # opposite to each
-        e, f = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-        height = np.abs(e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0])[:, None] / np.maximum(side, 1e-300)
-        least = np.minimum(INSIDE / np.maximum(height, 1e-300), 0.25)
-        least = np.where(self._is_border[face], least, 0.0)
-        # Towards the centroid by t: weight' = weight + t (1/3 - weight).
-        short = np.maximum(least - weight, 0.0)
-        t = (short / (1 / 3 - np.minimum(weight, 0.3))).max(axis=1)[:, None]
-        weight = weight + t * (1 / 3 - weight)
-        return np.einsum("nk,nkc->nc", weight, corner)
+        moved = np.empty_like(uv)
+        move_in(self.uv, self.is_border, face, np.ascontiguousarray(uv), INSIDE, moved)
+        return moved
 
     def locate(self, uv):
         """The Places of samples uv (n, 2)."""
@@ -110,9 +89,7 @@ class Domain:
 
     def face_at(self, uv):
         """(n,) triangle at each of uv (n, 2), -1 outside."""
-        origins = np.concatenate([uv, np.ones((len(uv), 1))], axis=1).astype(np.float32)
-        down = np.broadcast_to(np.array([0, 0, -1], dtype=np.float32), origins.shape)
-        return self._tracer.closest(origins, np.ascontiguousarray(down)).face.astype(np.int64)
+        return self._location.at(uv)
 
     def chart_at(self, uv):
         """(n,) chart at, or nearest to, each of uv (n, 2)."""
@@ -125,20 +102,8 @@ class Domain:
     def coverage(self, rows, columns):
         """What the cells of a uniform grid hold: (chart of the first (rows, columns) int64, -1 where nothing; bool,
         more than one)."""
-        u, v = np.meshgrid((np.arange(columns) + 0.5) / columns, (np.arange(rows) + 0.5) / rows)
-        face = self.face_at(np.stack([u.ravel(), v.ravel()], axis=1))
-        middle = np.where(face >= 0, self.chart[np.maximum(face, 0)], -1)
         on, _, owner = self._border
-        i = np.clip((on[:, 0] * columns).astype(np.int64), 0, columns - 1)
-        j = np.clip((on[:, 1] * rows).astype(np.int64), 0, rows - 1)
-        cell = np.concatenate([np.flatnonzero(middle >= 0), j * columns + i])
-        chart = np.concatenate([middle[middle >= 0], self.chart[owner]])
-        low = np.full(rows * columns, np.iinfo(np.int64).max)
-        high = np.full(rows * columns, -1)
-        np.minimum.at(low, cell, chart)
-        np.maximum.at(high, cell, chart)
-        is_mixed = (high > low) & (high >= 0)
-        return np.where(high >= 0, low, -1).reshape(rows, columns), is_mixed.reshape(rows, columns)
+        return self._location.labels(self.chart, rows, columns, on, owner)
 
     def shares(self, rows, columns):
         """(chart (rows, columns) as in `coverage`, share (rows, columns) of each cell that is part of the surface)."""
@@ -172,6 +137,21 @@ class Domain:
             for di in (0, 1):
                 straddling |= owner[dj : dj + rows, di : di + columns] != chart
         return needed, straddling & needed
+
+
+def borders(uv, chart, corner=None):
+    """(m, 3) bool: the edge opposite to corner k of the triangles uv (m, 3, 2) belongs to no other of its chart (m,).
+
+    corner (m, 3) int : numbers of their corners, the same where place and chart are, if known
+    """
+    if corner is None:
+        points = np.concatenate([uv.reshape(-1, 2), np.repeat(chart, 3)[:, None]], axis=1)
+        corner = numbered(points)[0].reshape(-1, 3)
+    corner = np.asarray(corner, dtype=np.int64)
+    a, b = corner[:, [1, 2, 0]].ravel(), corner[:, [2, 0, 1]].ravel()
+    edge = np.minimum(a, b) * (corner.max(initial=0) + 1) + np.maximum(a, b)
+    number, first = numbered(edge[:, None])
+    return (np.bincount(number, minlength=len(first)) == 1)[number].reshape(-1, 3)
 
 
 def corners_of(cells):

@@ -8,7 +8,7 @@ be: each corner's tangent plane is asked where it passes above the place, and th
 import numpy as np
 
 from lib.nurbs import evaluate
-from lib.surfaces.domain import Domain, barycentric
+from lib.surfaces.domain import Domain, barycentric, borders
 from lib.surfaces.loops import signed_area
 from lib.surfaces.mesh import Mesh
 from lib.surfaces.trimmed import TrimmedSurface
@@ -16,17 +16,28 @@ from lib.surfaces.trimmed import TrimmedSurface
 ONE_CHART = 0  # of a trimmed surface
 
 
-def domain_of(surface, cells):
+def domain_of(surface, cells, part=None):
     """The Domain of a trimmed surface or a mesh with charts, `cells` of its finest lattice along u and v; None where
-    the whole square belongs to the surface."""
+    the whole square belongs to the surface.  part : what part_of returns, where it is known."""
+    uv, border = part or part_of(surface)
     if isinstance(surface, Mesh):
-        return Domain(surface.uv, surface.chart, cells)
+        return Domain(surface.uv, surface.chart, cells, border)
+    return Domain(uv, np.full(len(uv), ONE_CHART), cells, border) if len(uv) else None
+
+
+def part_of(surface):
+    """(uv (m, 3, 2) triangles of the part of the map that belongs to the surface, border (k, 3) as of a Domain), the
+    slow things about a Domain; no triangles where the whole map does, or of a mesh, which has them already.
+    """
+    none = np.empty((0, 3, 2))
+    if isinstance(surface, Mesh) and surface.uv is not None:
+        return none, borders(surface.uv, surface.chart)
     if isinstance(surface, TrimmedSurface) and not is_whole(surface):
         from lib.surfaces.trim_mesh import domain_triangles  # here: a scene without trims need not load it
 
         uv, F = domain_triangles(surface)
-        return Domain(uv[F], np.full(len(F), ONE_CHART), cells, F)
-    return None
+        return uv[F], borders(uv[F], np.full(len(F), ONE_CHART), F)
+    return none, np.empty((0, 3), dtype=bool)
 
 
 def is_whole(trim):

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import rhino3dm
 
+from lib import forks
 from lib.nurbs.evaluate import evaluate, frame, point
 from lib.nurbs.shape import collapsed_sides, is_closed
 from tests.formats.reading import read, refused
@@ -147,3 +148,27 @@ def test_files_that_are_no_rhino_files_are_refused(tmp_path):
     assert "holds no visible surface; it holds 1 curve" in refused(
         made(tmp_path / "c.3dm", rhino3dm.UnitSystem.Meters, curve)
     )
+
+
+def test_cores_change_no_bit_of_what_is_read(three_cores):
+    """A body of more faces than one process is given: each with its borders, and its mistakes, as read by one alone."""
+    file = DATA.parents[1] / "data" / "scenes" / "fruit_room" / "v5_teapot.3dm"
+    here = read(file).patches
+    three_cores()
+    found = read(file).patches
+    assert len(found) == len(here) > 50
+    for one, other in zip(here, found, strict=True):
+        assert one.number == other.number and one.labels == other.labels and one.flip == other.flip
+        for name in ("uv", "S", "significance", "loop_start", "box"):
+            if hasattr(one.surface, name):
+                assert getattr(one.surface, name).tobytes() == getattr(other.surface, name).tobytes()
+        base, again = (getattr(each.surface, "base", each.surface) for each in (one, other))
+        assert base.Pw.tobytes() == again.Pw.tobytes() and base.knots_u.tobytes() == again.knots_u.tobytes()
+
+
+@pytest.fixture
+def three_cores():
+    """Allows three processes from when it is called to the end of the test."""
+    before = forks.allow(1)
+    yield lambda: forks.allow(3)
+    forks.allow(before)

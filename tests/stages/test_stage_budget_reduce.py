@@ -50,6 +50,9 @@ def build(folder):
             is_collapsed=np.zeros((n, 4), bool),
             shell=np.full(n, -1, np.int32),
             borders=np.zeros((0, 5), np.int32),
+            part_start=np.zeros((n + 1, 2), np.int64),
+            part_uv=np.zeros((0, 3, 2)),
+            part_border=np.zeros((0, 3), bool),
         ),
     )
     return [

@@ -74,6 +74,9 @@ def make(folder):
             no((3, 4), bool),
             np.full(3, -1, np.int32),
             np.array([[0, 1, 1, 0, 0]], np.int32),
+            no((4, 2), np.int64),
+            no((0, 3, 2)),
+            no((0, 3), bool),
         ),
     )
     maps = [ramp(0, 2), ramp(2.5, 3)]

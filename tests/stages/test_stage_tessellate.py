@@ -7,8 +7,9 @@ from lib.formats import casters, scene
 from lib.formats.artefact import ArtefactError, read_json
 from lib.nurbs.shape import transformed
 from stages import tessellate
-from tests.rooms import scene_of
+from tests.rooms import cube_mesh, scene_of
 from tests.shapes import box, disc, rectangle, sphere
+from tests.surfaces.trimmed_shapes import SQUARE, circle, cut_out
 
 
 def small_scene(scale=1.0, flip=()):
@@ -110,3 +111,48 @@ def test_damage_is_noticed(tmp_path):
 def load_good(tmp_path, data):
     (tmp_path / "good.npz").write_bytes(data)
     return casters.load(tmp_path / "good.npz")
+
+
+def plate_with_a_hole(radius, n=40):
+    """A plate of side 1 with a round hole; all of it fills the map but for the hole."""
+    base = rectangle([0, 0, 0], [1, 0, 0], [0, 1, 0])
+    return cut_out(base, [SQUARE, circle((0.5, 0.5), radius, n, is_hole=True)])
+
+
+def test_which_part_of_its_map_a_surface_fills_is_kept():
+    """A plate with a hole, its back, a mesh of six squares, and a surface that fills its map."""
+    surfaces = [
+        plate_with_a_hole(0.25),
+        plate_with_a_hole(0.25),
+        cube_mesh(),
+        rectangle([3, 0, 0], [1, 0, 0], [0, 1, 0]),
+    ]
+    x = tessellate.make(surfaces, [False, True, False, False], ["full"] * 4, 1e-3, [-1, 0, -1, -1])
+    uv, border = x.part(0)
+    e, f = uv[:, 1] - uv[:, 0], uv[:, 2] - uv[:, 0]
+    hole = 40 / 2 * 0.25**2 * np.sin(2 * np.pi / 40)
+    assert (e[:, 0] * f[:, 1] - e[:, 1] * f[:, 0]).sum() / 2 == pytest.approx(1 - hole, rel=1e-12)
+    side = np.linalg.norm(np.roll(uv, -1, axis=1) - np.roll(uv, 1, axis=1), axis=2)  # opposite to each corner
+    assert side[border].sum() == pytest.approx(4 + 40 * 2 * 0.25 * np.sin(np.pi / 40), rel=1e-12)
+    assert [len(part) for part in x.part(1)] == [0, 0]
+    uv, border = x.part(2)
+    assert len(uv) == 0 and border.sum(axis=1).tolist() == [2] * 12  # each square is cut in two
+    assert [len(part) for part in x.part(3)] == [0, 0]
+
+
+def test_a_damaged_part_is_noticed(tmp_path):
+    good = vars(tessellate.make([plate_with_a_hole(0.25)], [False], ["full"], 1e-3))
+    casters.save(tmp_path / "good.npz", casters.Casters(**good))
+    for damage in ({"part_uv": good["part_uv"][1:]}, {"part_start": good["part_start"][::-1]}):
+        with pytest.raises(ArtefactError, match="part_start"):
+            casters.save(tmp_path / "bad.npz", casters.Casters(**good | damage))
+
+
+def test_cores_change_no_byte(tmp_path):
+    """Sixty plates, each with a hole of its own size: more than one process is worth."""
+    plates = {f"plate{k:02}": (plate_with_a_hole(0.2 + 0.004 * k), {}) for k in range(60)}
+    scene.save(tmp_path / "scene.npz", scene_of(plates))
+    argv = ["--scene", str(tmp_path / "scene.npz"), "--settings", "{}"]
+    for threads in ("1", "3"):
+        assert tessellate.main([*argv, "--out", str(tmp_path / f"{threads}.npz"), "--threads", threads]) == 0
+    assert (tmp_path / "1.npz").read_bytes() == (tmp_path / "3.npz").read_bytes()

@@ -8,6 +8,7 @@ import pytest
 from lib.formats import lod_mesh, mesh_ladder, scene
 from lib.formats.artefact import read_json
 from lib.lod import thinned
+from lib.lod.mesh_levels import TRIALS
 from lib.surfaces.measure import transformed
 from stages import lod_export, tessellate, thin_meshes
 from tests.lod.charted_meshes import sphere, split
@@ -61,7 +62,7 @@ def test_each_group_of_touching_meshes_is_in_the_file_once(files):
     assert [len(known.history.death) for known in found] == [12 * 12**2, 12 * 8**2]
     for known in found:
         assert (known.measured[0, :, :3] == 0).all() and (known.measured[-1, :, 0] > 0).all()
-        assert known.measured[0, :, 3].sum() == len(known.history.death) and len(known.steps) >= 12
+        assert known.measured[0, :, 3].sum() == len(known.history.death) and len(known.steps) >= 5
     notes = read_json(files / "cost.json")["notes"]
     assert notes["meshes"] == 3 and notes["groups"] == 2 and notes["triangles"] == 12 * (12**2 + 8**2)
 
@@ -74,20 +75,22 @@ def test_a_second_run_writes_the_same_bytes(files):
 @pytest.mark.parametrize("k", range(len(LEVELS)))
 def test_levels_are_the_same_with_the_file_and_without(files, k, monkeypatch):
     finest = ["--finest", first_of(files)] if k == 1 else []
+    built, patches = [], thinned.Thinned.patches
+    monkeypatch.setattr(thinned.Thinned, "patches", lambda self, step: built.append(step) or patches(self, step))
     assert export(files, k, files / "without.npz", *finest) == 0
+    survey = len(built)
 
     def unexpected(*args, **kwargs):
         raise AssertionError("collapses found again")
 
     monkeypatch.setattr(thinned.fast_simplification, "simplify", unexpected)
-    built, patches = [], thinned.Thinned.patches
-    monkeypatch.setattr(thinned.Thinned, "patches", lambda self, step: built.append(step) or patches(self, step))
+    built.clear()
     assert export(files, k, files / "with.npz", "--ladder", files / "ladder.npz", *finest) == 0
     assert (files / "with.npz").read_bytes() == (files / "without.npz").read_bytes()
-    assert len(built) == 2  # one of each group
+    assert 2 <= len(built) <= 2 + 2 * TRIALS and len(built) < survey / 2  # of each group one, and what was tried before
     level = lod_mesh.load(files / "with.npz")
     count = np.diff(level.face_start)
-    assert count[3] == count[4] and (k == 0) == (level.distance.max() <= 0.01 * 4)
+    assert count[3] == count[4] and (k > 0 or level.distance.max() <= 0.01 * 4)
     assert count.sum() <= [np.inf, 0.8 * len(lod_mesh.load(first_of(files)).F), 400][k]
 
 
