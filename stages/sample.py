@@ -11,7 +11,7 @@ import numpy as np
 from lib import door
 from lib.elements.grids import POINTS
 from lib.formats import casters, samples, scene
-from lib.radiosity.sampling import base_lattice, surface_elements
+from lib.radiosity.sampling import base_lattice, elements_of
 from lib.radiosity.world import World
 from lib.refusal import demand_finite
 
@@ -37,7 +37,7 @@ def body(args, cost):
     bounces = chosen["bounces"] != 1 and len(world.emitters.E) > 0
     rays = chosen["rays_per_element"] if bounces else 0
     lit = [s for s in mine if grids.n_u[s]]
-    elements = [surface_elements(world, s, seed, grids, rays, base[s]) for s in lit]
+    elements = elements_of(world, lit, seed, grids, rays, base)
     samples.save(args.out, packed(mine, base, lit, elements, grids, world.n_groups))
     cost.rays = world.tracer.rays
     cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))

@@ -1,6 +1,7 @@
 """First samples of a chunk of surfaces: direct light on the base lattices, and the elements with their rows."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -109,11 +110,38 @@ class Elements:
     H_direct: np.ndarray
 
 
-def surface_elements(world, s, seed, grids, R, base):
-    """Elements of surface s: their points, rows and direct light.
+def elements_of(world, surfaces, seed, grids, R, base):
+    """Elements of each of the surfaces: their points, rows and direct light; a list.
 
-    base : (value, hidden, noise, level) of the surface's base lattice; R rays per element, 0 casts none (one bounce).
+    base : {surface: (value, hidden, noise, level)} of base lattices; R rays per element, 0 casts none (one bounce).
     """
+    drafts = [_draft(world, s, seed, grids, R, base[s]) for s in surfaces]
+    asked = [draft for draft in drafts if draft.own.any()]
+    if asked:  # all in one batch: a small surface asks for a few
+        points = Points(*(_joined(field) for field in zip(*(draft.points for draft in asked), strict=True)))
+        H = direct_at(world, points, FEW_RAYS)[0].H.reshape(len(points.x), -1)
+        for draft, part in zip(asked, np.split(H, np.cumsum([draft.own.sum() for draft in asked])[:-1]), strict=True):
+            draft.light[draft.own] = part
+    return [Elements(d.rows, d.is_alone, d.area, by_element(d.light) * ~d.rows.is_hidden[..., None]) for d in drafts]
+
+
+def _joined(fields):
+    return None if fields[0] is None else np.concatenate(fields)
+
+
+class _Draft(NamedTuple):
+    """Elements but for the direct light at some of their points (4 n_v, 4 n_u): light (.., 3 G) interpolated, own (..)
+    bool where it is not good enough; points, the fields of Points there."""
+
+    rows: Rows
+    is_alone: np.ndarray
+    area: np.ndarray
+    light: np.ndarray
+    own: np.ndarray
+    points: tuple
+
+
+def _draft(world, s, seed, grids, R, base):
     n_u, n_v = int(grids.n_u[s]), int(grids.n_v[s])
     u, v = point_parameters(n_u, n_v)
     on = points_on(world, s, u, v)
@@ -130,22 +158,21 @@ def surface_elements(world, s, seed, grids, R, base):
     rows = without(rows, ~found.keeps & ~rows.is_hidden)
     visible = ~rows.is_hidden
     area = by_element(on.density) * visible / visible.size
+    is_alone = found.is_alone | _between_charts(by_element(on.chart), outside, n_u, n_v)
     value, hidden, noise, level = base
     cover = world.cover(s, level)
     light = _bilinear(*(finer(value, hidden) if cover is None else (value, hidden)), u, v)
+    # Between samples in light and shadow, of two rooms, or of two charts, nothing can be interpolated.
     cells = _walled_cells(is_walled, hidden.shape) | (cover[1] if cover is not None else False)
     rough = cells | is_rough(value, hidden, noise)
     at = np.ix_(_cells_of(v, hidden.shape[0]), _cells_of(u, hidden.shape[1]))
     if (rough[at] & on.is_part).sum() * len(world.emitters.facets.area) <= MOST_PAIRS:
         cells = rough
     own = cells[at] & on.is_part
-    if own.any():  # between samples in light and shadow, of two rooms, or of two charts, nothing can be interpolated
-        key = stream(f"{seed} elements", world.scene.names[s])
-        j, i = np.nonzero(own)
-        points = Points(np.full(len(j), s), None, None, lifted[own], on.N[own], shift(key, i, j))
-        light[own] = direct_at(world, points, FEW_RAYS)[0].H.reshape(len(j), -1)
-    is_alone = found.is_alone | _between_charts(by_element(on.chart), outside, n_u, n_v)
-    return Elements(rows, is_alone, area, by_element(light) * visible[..., None])
+    j, i = np.nonzero(own)
+    key = stream(f"{seed} elements", world.scene.names[s])
+    points = np.full(len(j), s), None, None, lifted[own], on.N[own], shift(key, i, j)
+    return _Draft(rows, is_alone, area, light, own, points)
 
 
 @dataclass(frozen=True)

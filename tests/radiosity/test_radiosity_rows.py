@@ -5,7 +5,7 @@ import pytest
 
 from lib.nurbs.shape import transformed
 from lib.radiosity.rows import ABSORBED, NO_RAY, NOTHING
-from lib.radiosity.sampling import base_lattice, surface_elements
+from lib.radiosity.sampling import base_lattice, elements_of
 from tests.rooms import cube, world_of
 from tests.shapes import rectangle, sphere
 from tests.tolerances import STANDARD_ERRORS
@@ -17,7 +17,8 @@ def rows_of(world, R=256, n_elements=96, seed=1):
     """{surface: Elements} and the grids."""
     grids = world.grids(n_elements)
     base = base_lattice(world, range(world.n), seed, 2, (4, 4))[0]
-    return {s: surface_elements(world, s, seed, grids, R, base[s]) for s in range(world.n) if grids.n_u[s]}, grids
+    lit = [s for s in range(world.n) if grids.n_u[s]]
+    return dict(zip(lit, elements_of(world, lit, seed, grids, R, base), strict=True)), grids
 
 
 @pytest.fixture(scope="module")
