@@ -397,6 +397,7 @@ rule report:
     log:
         text=f"{STAGE}/report/log.txt",
         cost=f"{STAGE}/report/cost.json",
+    threads: 2
     params:
         *code("report"),
         settings=SETTINGS["report"],
@@ -405,4 +406,4 @@ rule report:
         "{RUN} report --results {params.results:q} --scene {input.scene:q} --casters {input.casters:q}"
         " --solution {input.solution:q} --direct {input.direct:q} --indirect {input.indirect:q} --maps {input.maps:q}"
         " --textures {input.textures:q} --budget {input.budget:q} --lods {input.lods:q} --settings {params.settings:q}"
-        " --out-html {output.html:q} --out-json {output.json:q} --log {log.text:q} --cost {log.cost:q}"
+        " --out-html {output.html:q} --out-json {output.json:q} --log {log.text:q} --cost {log.cost:q} --threads {threads}"

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lib import forks
 from lib.formats import exported, pictures
 from lib.formats.quantities import METRES
 from lib.formats.report_html import Pictures, Thumbnail
@@ -14,22 +15,33 @@ MOST_THUMBNAILS = 160
 
 def draw(bake, facts, settings):
     """Pictures of the levels and maps, and what the viewer shows (None where that is too large to inline)."""
-    known, inlined, levels, hero, view, near = {}, [], [], None, None, None
-    for level in facts["levels"]:
-        path = bake.folder / level["file"]
-        parts, textures = exported.load(path, known)
+    files = [bake.folder / level["file"] for level in facts["levels"]]
+    given = settings.get("camera")
+    view = scene_camera(given, settings) if given else None
+    tasks = (lambda: _levels(files, view)), (lambda: (_hero(files[0], view), map_thumbnails(bake, facts)))
+    (levels, place, inlined), (hero, maps) = forks.mapped(lambda task: task(), tasks, few=1)
+    return Pictures(hero, levels, maps, place), None if None in inlined else _viewer_model(inlined, place)
+
+
+def _hero(file, view):
+    """PNG of the finest level, seen from `view` or where most of it shows."""
+    parts, textures = exported.load(file)
+    model = picture.join(parts)
+    return pictures.png_bytes(picture.render(model, textures, view or cameras.automatic(model), *HERO))
+
+
+def _levels(files, view):
+    """(two PNGs of each level, where the camera stands, what the viewer needs of each file)."""
+    known, levels, near = {}, [], None
+    for file in files:
+        parts, textures = exported.load(file, known)
         model = picture.join(parts)
-        if view is None:
-            given = settings.get("camera")
-            view = scene_camera(given, settings) if given else cameras.automatic(model)
+        if near is None:
+            view = view or cameras.automatic(model)
             near = cameras.closer(model, view, *SMALL)
-            hero = pictures.png_bytes(picture.render(model, textures, view, *HERO))
-        shots = picture.render_with_edges(model, textures, near, *SMALL)
-        levels.append(tuple(pictures.png_bytes(shot) for shot in shots))
-        inlined.append(exported.inlined(path))
+        levels.append(tuple(map(pictures.png_bytes, picture.render_with_edges(model, textures, near, *SMALL))))
     place = {"eye": [float(x) for x in view.eye], "target": [float(x) for x in view.target], "fov": float(view.fov)}
-    drawn = Pictures(hero, levels, map_thumbnails(bake, facts), place)
-    return drawn, None if None in inlined else _viewer_model(inlined, place)
+    return levels, place, [exported.inlined(file) for file in files]
 
 
 def _viewer_model(inlined, place):

@@ -269,10 +269,13 @@ def plan(demands, link):
 def _bounds(demands, link, members, is_mirrored):
     kinks = [np.array([0.0, 1.0])]
     for m in members:
-        own = np.union1d(demands[m // 2].kinks[m % 2], demands[m // 2].forced[m % 2])
+        own = np.concatenate([demands[m // 2].kinks[m % 2], demands[m // 2].forced[m % 2]])
         kinks.append(1 - own if link.is_reversed[m] else own)
         kinks.append(1 - own if is_mirrored else own[:0])
-    edge = np.unique(np.concatenate(kinks))
+    edge = np.concatenate(kinks)
+    if edge.size == 2:
+        return edge
+    edge = np.unique(edge)
     return edge[np.concatenate([[True], np.diff(edge) > 1e-9])]
 
 
@@ -332,6 +335,9 @@ def place(p, tolerance, count):
     for g, edge in enumerate(p.bounds):
         own = count[p.first[g] : p.first[g] + edge.size - 1]
         wanted = []
+        if own.max() == 1 and edge.size == 2:
+            sets.append(edge)
+            continue
         for m in nodes[starts[g] : starts[g + 1]] if own.max() > 1 else ():
             at, root_K = _oriented(p.demands, p.links, m)
             wanted.append((at, (np.sqrt(root_K**2 + added[m][:, None]) / scale[m][:, None]).max(axis=0)))
@@ -349,9 +355,12 @@ def _place(wanted, edge, count, is_mirrored):
     """Lines of one set: `count` (k,) steps between the `edge` parameters (k + 1,), each of equal integral of the
     largest of the densities `wanted`, pairs of `at` (m + 1,) and (m,).
     """
-    at = np.unique(np.concatenate([edge, *(a for a, _ in wanted)]))
-    middle = (at[:-1] + at[1:]) / 2
-    density = np.max([d[np.searchsorted(a, middle) - 1] for a, d in wanted] or [np.ones(middle.size)], axis=0)
+    if len(wanted) == 1 and edge.size == 2:  # most often: steps of one surface, from end to end
+        ((at, density),) = wanted
+    else:
+        at = np.unique(np.concatenate([edge, *(a for a, _ in wanted)]))
+        middle = (at[:-1] + at[1:]) / 2
+        density = np.max([d[np.searchsorted(a, middle) - 1] for a, d in wanted] or [np.ones(middle.size)], axis=0)
     density = density + max(0.05 * density.max(), 1e-30)  # never a step without end where the surface is straight
     summed = _cumulative(at, density)
     own = np.interp(edge, at, summed)
@@ -361,5 +370,7 @@ def _place(wanted, edge, count, is_mirrored):
     lines = np.concatenate(
         [np.concatenate([[a], np.rint(t * GRAIN) / GRAIN]) for a, t in zip(edge, inner, strict=False)]
     )
-    lines = np.unique(np.append(lines, 1.0))
+    lines = np.append(lines, 1.0)
+    if (np.diff(lines) <= 0).any():
+        lines = np.unique(lines)
     return (lines + (1 - lines[::-1])) / 2 if is_mirrored else lines

@@ -55,7 +55,7 @@ class TrimmedPieces:
         out = []
         for s, (u, v) in enumerate(placed):
             d = self.plan.demands[s]
-            kinks = tuple(np.union1d(k, f) for k, f in zip(d.kinks, d.forced, strict=True))
+            kinks = tuple(np.union1d(k, f) if f.size else k for k, f in zip(d.kinks, d.forced, strict=True))
             out.append(Lines(u, v, kinks, self.known.extent[s]))
         return out
 
