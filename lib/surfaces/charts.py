@@ -23,6 +23,7 @@ LEAST_LEVEL, MOST_LEVEL = 3, 11
 AREA = 1e6
 MOST_CELLS = 8192  # a side, of a packing that is not kept
 TRIALS = 4  # packings until the map is nearly full
+MOST_COARSER = 1.5  # times the wanted edge of a cell; a larger map is taken before that
 MOST_STRETCH = 3.0  # of the mesh's own texture coordinates, between any two directions or places of a chart ...
 BAD_SHARE = 0.01  # ... but for this share of the area
 SHORT = 0.01  # side that a triangle in a chart of its own is given at least
@@ -35,7 +36,7 @@ def charted(mesh, texel):
     """The mesh with charts.
 
     mesh : Mesh;  texel : wanted edge of a cell of the map's finest level, in the mesh's unit
-    Returns Mesh with uv, chart and level.  Cells come out within a factor sqrt(2) of `texel`; larger where the map
+    Returns Mesh with uv, chart and level.  Cells come out within a factor MOST_COARSER of `texel`; larger where the map
     would need more than 2^MOST_LEVEL cells a side, smaller where it fits in 2^LEAST_LEVEL.
 
     Raises ValueError `charts: ...` where the charts do not fit, however small.
@@ -231,7 +232,11 @@ def _next_density(tried, room):
     if fits[1] > 0.9 * room or over[0] < 1.02 * fits[0]:
         return None
     if not fits[0]:
-        low = 2 * PADDING
+        low, (first, *_) = 2 * PADDING, tried[0]
+        if len(tried) > 1 and tried[-1][1] < tried[-2][1]:  # much of it is the space between charts
+            slope = (tried[-2][1] - tried[-1][1]) / (tried[-2][0] - tried[-1][0])
+            density = over[0] - (over[1] - 0.98 * room) / slope
+            return density if density * MOST_COARSER > first or room == 2**MOST_LEVEL else None
         return over[0] * max(0.97 * (room - low) / (over[1] - low), 0.25)
     if over[0] == np.inf:
         if len(tried) > 1 and tried[-1][1] > tried[-2][1]:  # much of it is the space between charts: a line

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import distance_transform_edt
 
-from lib.surfaces.charts import LEAST_LEVEL, MOST_LEVEL, PADDING, charted, overlap, own_charts, stretch
+from lib.surfaces.charts import LEAST_LEVEL, MOST_LEVEL, PADDING, _next_density, charted, overlap, own_charts, stretch
 from lib.surfaces.mesh_build import mesh, normals_areas
 
 FINE = 8  # points per cell at which gaps are measured
@@ -85,7 +85,7 @@ def test_a_box_becomes_rectangles_on_the_lattice():
         border = np.concatenate([corners.min(axis=0), corners.max(axis=0)])
         assert np.abs(border - np.round(border)).max() < 1e-9
     low, high = stretch(m.V, m.F, m.uv * side)
-    assert high.max() / low.min() < 1.1  # stretched up to whole cells, of some ten across the shortest side
+    assert high.max() / low.min() < 8 / 7  # stretched up to whole cells, of more than seven across the shortest side
     assert 0.1 / np.sqrt(2) * 0.9 < 1 / high.max() <= 1 / low.min() < 0.1 * np.sqrt(2) * 1.1
 
 
@@ -183,3 +183,14 @@ def test_a_strip_a_thousand_million_times_as_long_as_wide():
     m = charted(mesh(V, [[0, 1, 2], [0, 2, 3], [4, 5, 6]])[0], 0.01)
     assert (m.level, m.chart.max()) == (MOST_LEVEL, 1)
     assert PADDING <= m.uv.min() * 2**MOST_LEVEL and m.uv.max() * 2**MOST_LEVEL <= 2**MOST_LEVEL - PADDING
+
+
+def test_a_size_that_does_not_fit_is_met_along_the_line_of_those_tried():
+    """Maps of 40 + 1000 x density cells a side, for one of 128; none where the cells would come out too coarse."""
+
+    def tried(*densities):
+        return [(d, 40 + 1000 * d, None) for d in densities]
+
+    assert _next_density(tried(0.1, 0.095), 128) == pytest.approx((0.98 * 128 - 40) / 1000, rel=1e-12)
+    assert _next_density(tried(0.2, 0.15), 128) is None
+    assert _next_density(tried(0.088), 128) is None  # full enough
