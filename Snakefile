@@ -369,6 +369,7 @@ rule package:
     log:
         text=f"{STAGE}/package/log.txt",
         cost=f"{STAGE}/package/cost.json",
+    threads: MOST_CORES
     params:
         *code("package"),
         settings=SETTINGS["package"],
@@ -377,7 +378,7 @@ rule package:
     shell:
         "{RUN} package --scene {input.scene:q} --casters {input.casters:q} --textures {input.textures:q}"
         " --budget {input.budget:q} --lods {input.lods:q} --materials {params.materials:q} --settings {params.settings:q} --results {params.results:q}"
-        " --log {log.text:q} --cost {log.cost:q}"
+        " --log {log.text:q} --cost {log.cost:q} --threads {threads}"
 
 
 rule report:

@@ -11,12 +11,14 @@ from functools import cache, partial
 
 import numpy as np
 
+from lib import forks
 from lib.formats import gltf, pictures, textured_maps
 from lib.maps import display, estimate, gouraud
 from lib.surfaces.mesh import Mesh
 
 FAR = 100  # a scene farther from the origin than this many of its sizes is exported around its own centre: float32
 GREY = (0.5, 0.5, 0.5)  # reflectance of what has none stated
+FEW = 8  # textures, that are not worth another process
 
 
 @dataclass(frozen=True)
@@ -36,33 +38,26 @@ def looks(x, shapes, maps, rho_avg, exposure, reconstruction, levels, results):
     """
     mean_B = cache(lambda: display.mean_radiosity(textured_maps.reflected(maps), shapes.area[maps.final.surface]))
     lamps = _facets(levels[-1], np.flatnonzero(x.E.any(axis=1)), x.E)
-    out = []
-    for s, name in enumerate(x.names):
-        k = maps.final.position(s)
+
+    def look(s):
+        name, k = x.names[s], maps.final.position(s)
         if k < 0 and x.is_black[s]:
-            out.append(Look(gltf.Material(name, colour=_clipped(display.light(x.E[s], exposure)))))
-            continue
+            return Look(gltf.Material(name, colour=_clipped(display.light(x.E[s], exposure))))
         if k < 0:
-            out.append(
-                Look(
-                    gltf.Material(name),
-                    in_vertices=_estimated(rho_avg.get(name, GREY), x.E[s], lamps, mean_B(), exposure),
-                )
-            )
-            continue
+            rho = np.asarray(rho_avg.get(name, GREY))
+            return Look(gltf.Material(name), in_vertices=partial(_estimated, rho, x.E[s], lamps, mean_B(), exposure))
         light = display.picture(maps.final.map(k), maps.final.hidden_map(k), maps.E[k], exposure)
         if (light[0] == light[0, 0]).all() and (light == light[0, 0]).all():
-            out.append(Look(gltf.Material(name, colour=_clipped(light[0, 0]))))
-        elif not isinstance(x.surfaces[s], Mesh) and _in_vertices(
+            return Look(gltf.Material(name, colour=_clipped(light[0, 0])))
+        if not isinstance(x.surfaces[s], Mesh) and _in_vertices(
             reconstruction.get(name, "auto"), light, [level.UV[_vertices(level, s)] for level in levels]
         ):
-            out.append(Look(gltf.Material(name), in_vertices=partial(_from_map, light)))
-        else:
-            uri = f"textures/{x.files[s]}.png"
-            pictures.write_png_srgb(results / uri, light)
-            png = (results / uri).read_bytes()
-            out.append(Look(gltf.Material(name, uri=uri, png=png), size=light.shape[:2]))
-    return out
+            return Look(gltf.Material(name), in_vertices=partial(_from_map, light))
+        uri = f"textures/{x.files[s]}.png"
+        png = pictures.write_png_srgb(results / uri, light)
+        return Look(gltf.Material(name, uri=uri, png=png), size=light.shape[:2])
+
+    return forks.mapped(look, range(len(x.names)), few=FEW)
 
 
 def _facets(level, surfaces, E):
@@ -73,14 +68,10 @@ def _facets(level, surfaces, E):
     return *(level.V[F[:, k]] for k in range(3)), E[owner]
 
 
-def _estimated(rho, E, lamps, mean_B, exposure):
+def _estimated(rho, E, lamps, mean_B, exposure, V, N, UV):
     """A Look's in_vertices for a surface without a map."""
-
-    def shown(V, N, UV):
-        H = estimate.irradiance(V, N.astype(np.float64), *lamps, mean_B)
-        return display.light(np.asarray(rho) * H + E, exposure)
-
-    return shown
+    H = estimate.irradiance(V, N.astype(np.float64), *lamps, mean_B)
+    return display.light(rho * H + E, exposure)
 
 
 def _from_map(light, V, N, UV):

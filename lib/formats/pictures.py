@@ -284,11 +284,15 @@ def _codes(linear, threshold):
 
 
 def write_png_srgb(path, linear):
-    """Write linear RGB (h, w, 3), row 0 = top, as a dithered 8-bit sRGB PNG. Raises ValueError, ArtefactError."""
+    """Write linear RGB (h, w, 3), row 0 = top, as a dithered 8-bit sRGB PNG: its bytes. Raises ValueError,
+    ArtefactError.
+    """
     linear = np.asarray(linear)
     if linear.ndim != 3 or linear.shape[2] != 3 or not np.isfinite(linear).all():
         raise ValueError(f"linear: expected finite (h, w, 3), found {linear.shape}")
     write_png8(path, quantise_srgb(linear))
+    with open(path, "rb") as file:
+        return file.read()
 
 
 def write_png8(path, codes):
