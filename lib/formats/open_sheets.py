@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from lib import forks
 from lib.formats.scene_table import REFLECTANCE
 from lib.surfaces.closed import in_closed_shell
 from lib.surfaces.coarse import coarse
@@ -18,7 +19,7 @@ def lit_sides(placed, table, asked):
 
     table : rows of scene_table
     """
-    parts = [coarse(one.surface) for one in placed]
+    parts = forks.mapped(lambda one: coarse(one.surface), placed)
     start = np.cumsum([0, *(len(V) for V, _ in parts)])
     V = np.concatenate([V for V, _ in parts])
     F = np.concatenate(

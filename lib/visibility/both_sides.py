@@ -8,9 +8,11 @@ whether a side is dark.
 
 import math
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
+from lib import forks
 from lib.compiled import compiled
 from lib.elements.lattice import OFFSET
 from lib.visibility.hemisphere import cosine_direction_each
@@ -19,7 +21,8 @@ from lib.visibility.tracer import Tracer
 PLACES = 256  # of a side: light that enters a crack along the border reaches too few to count
 BOUNCES = 4
 SHADOW_RAYS = 4  # from a place and from every point of a path
-PATHS_AT_ONCE = 1 << 18
+AT_ONCE = 32  # surfaces, whose paths share their random numbers
+FEW = 2  # such parts that are not worth another process
 DARK = 0.01
 
 
@@ -51,15 +54,19 @@ def side_light(V, F, face_surface, E, rho, candidates, seed=0):
 
     is_candidate = np.zeros(len(power), dtype=bool)
     is_candidate[candidates] = True
-    room = _Room(V, F, face_surface, np.asarray(rho, dtype=np.float64), is_candidate, lamps, Tracer(V, F))
-    rng = np.random.default_rng(seed)
-    at_once = max(1, PATHS_AT_ONCE // (2 * PLACES))
-    for first in range(0, len(order), at_once):
-        some = order[first : first + at_once]
-        place, N = _places(V, F, sheets, first, len(some), rng)
+
+    @cache
+    def room():  # of each process: a tracer that a fork has from its parent can not be used
+        return _Room(V, F, face_surface, np.asarray(rho, dtype=np.float64), is_candidate, lamps, Tracer(V, F))
+
+    def means(first):
+        n, rng = len(order[first : first + AT_ONCE]), np.random.default_rng([seed, first])
+        place, N = _places(V, F, sheets, first, n, rng)
         # Send as many paths from the front as from the back.
-        H = room.irradiance(np.concatenate([place, place]), np.concatenate([N, -N]), rng)
-        light[some] = H.reshape(2, len(some), PLACES).mean(axis=2).T
+        H = room().irradiance(np.concatenate([place, place]), np.concatenate([N, -N]), rng)
+        return H.reshape(2, n, PLACES).mean(axis=2).T
+
+    light[order] = np.concatenate(forks.mapped(means, range(0, len(order), AT_ONCE), few=FEW))
     return light
 
 
