@@ -19,6 +19,7 @@ import os
 import platform
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 from statistics import median
 
@@ -164,9 +165,10 @@ def machine():
         }
     except OSError:
         models = {platform.processor()}
-    commit = subprocess.run(
-        ["git", "describe", "--always", "--dirty"], cwd=ROOT, capture_output=True, text=True
-    ).stdout.strip()
+    git = partial(subprocess.run, cwd=ROOT, capture_output=True, text=True)
+    commit = git(["git", "rev-parse", "--short", "HEAD"]).stdout.strip()
+    changed = git(["git", "status", "--porcelain", "--", ".", ":!benchmarks/results"]).stdout  # those are being written
+    commit += "-dirty" if changed else ""
     return {
         "processor": ", ".join(sorted(models)),
         "cores": os.cpu_count(),

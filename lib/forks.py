@@ -45,7 +45,9 @@ def mapped(function, items, few=FEW, together=1):
     sys.stdout.flush()
     sys.stderr.flush()
     try:
-        children += [_forked(queue, function, items, step, file) for file in files]
+        for file in files:
+            with suppress(OSError):  # no room for another process: the others do its part
+                children.append(_forked(queue, function, items, step, file))
         done = dict(_worked(queue, function, items, step))
         _wait(children)
         for file in files:
@@ -63,6 +65,7 @@ def mapped(function, items, few=FEW, together=1):
         raise RuntimeError("a process of this job ended before its work was done")
     for k in range(len(items)):
         if not done[k][0]:
+            function(items[k])  # raises it again, from where it stands in the code
             raise done[k][1]
     return [done[k][1] for k in range(len(items))]
 

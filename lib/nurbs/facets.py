@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lib.nurbs import facet_kernels as kernels
 from lib.nurbs.evaluate import evaluate_grid
 from lib.nurbs.lines import unit
 
@@ -192,10 +193,14 @@ def _mesh(S, u, v, is_falling, is_collapsed):
 
 def has_area(points, F):
     """Mask of the triangles F (m, 3) whose corners are three and do not lie on one line."""
-    three = (F[:, 0] != F[:, 1]) & (F[:, 1] != F[:, 2]) & (F[:, 2] != F[:, 0])
-    A, B, C = points[F[:, 0]], points[F[:, 1]], points[F[:, 2]]
-    longest = np.max([np.linalg.norm(X, axis=1) for X in (B - A, C - B, A - C)], axis=0, initial=0.0)
-    return three & (np.linalg.norm(np.cross(B - A, C - A), axis=1) > FLAT * longest**2)
+    return kinds(points, F) == kernels.WHOLE
+
+
+def kinds(points, F):
+    """(m,) int of lib.nurbs.facet_kernels: which triangles F (m, 3) of points (k, 3) have an area."""
+    kind = np.empty(len(F), dtype=np.int64)
+    kernels.kinds(np.ascontiguousarray(points, dtype=np.float64), np.ascontiguousarray(F, dtype=np.int64), FLAT, kind)
+    return kind
 
 
 def _compact(points, parameters, F, side):

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from lib.nurbs.evaluate import evaluate
-from lib.nurbs.facets import normals
+from lib.nurbs.facet_kernels import measure
 
 MANY = 300  # triangles; with more, fewer samples in each tell the distance
 
@@ -60,12 +59,10 @@ def distances(base, S, uv, F, before=None):
 
 
 def _measured(base, S, uv, F, weights):
-    at = np.clip(np.einsum("qk,mkc->mqc", weights, uv[F]), 0.0, 1.0).reshape(-1, 2)
-    exact = evaluate(base, at[:, 0], at[:, 1])[0].reshape(len(F), len(weights), 3)
-    off = exact - np.einsum("qk,mkc->mqc", weights, S[F])
-    normal, area = normals(*(S[F[:, k]] for k in range(3)))
-    height = np.abs(np.einsum("mqc,mc->mq", off, normal))
-    on_edge = [height[:, weights[:, (k + 2) % 3] == 0].max(axis=1, initial=0.0) for k in range(3)]
-    slide = np.linalg.norm(off, axis=2).max(axis=1, initial=0.0)
-    height, square = height.max(axis=1, initial=0.0), (height**2).mean(axis=1)
-    return height, np.stack(on_edge, axis=1), square, slide, area
+    m = len(F)
+    height, square, slide, area, on_edge = np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty((m, 3))
+    surface = base.knots_u, base.knots_v, np.ascontiguousarray(base.Pw), base.degree_u, base.degree_v
+    scratch = np.empty((4, max(base.degree_u, base.degree_v) + 1))
+    uv, S, F = np.ascontiguousarray(uv), np.ascontiguousarray(S), np.ascontiguousarray(F)
+    measure(*surface, uv, S, F, weights, scratch, height, on_edge, square, slide, area)
+    return height, on_edge, square, slide, area

@@ -6,19 +6,19 @@ facing two short ones; instead the diagonal it has in common with its neighbour 
 
 import numpy as np
 
-from lib.nurbs.facets import has_area
+from lib.nurbs.facet_kernels import NO_AREA, ONE_PLACE
+from lib.nurbs.facets import has_area, kinds
 
 MOST_FLIPS = 1000
 
 
 def without_flat(S, F, edges):
     """The triangles F (m, 3) of points S (k, 3), flat ones flipped or left out; edges (e, 2) are never flipped."""
-    two = [(S[F[:, k]] == S[F[:, (k + 1) % 3]]).all(axis=1) for k in range(3)]
-    F = F[~np.logical_or.reduce(two)]
-    flat = np.flatnonzero(~has_area(S, F))
+    kind = kinds(S, F)
+    F = F[kind != ONE_PLACE]
+    flat = np.flatnonzero(kind[kind != ONE_PLACE] == NO_AREA)
     if not flat.size:
         return F
-    F = F.copy()
     owner = {(int(t[k]), int(t[(k + 1) % 3])): i for i, t in enumerate(F) for k in range(3)}
     fixed = {(int(min(e)), int(max(e))) for e in edges}
     todo, flips = list(flat), 0

@@ -12,8 +12,8 @@ import pythoncdt
 
 from lib.nurbs.evaluate import evaluate
 from lib.nurbs.facets import Patch
-from lib.surfaces.loops import corner_runs, double_area, following, inside_loops
-from lib.surfaces.pieces import pieces
+from lib.surfaces import loop_kernels
+from lib.surfaces.loops import corner_runs, double_area, following
 from lib.surfaces.rows import numbered
 from lib.surfaces.trim_distance import distances
 from lib.surfaces.trim_flat import without_flat
@@ -98,24 +98,12 @@ def _inside(points, edges, more):
 
 
 def _in_loops(points, F, loops):
-    """(m,) bool: triangles F inside the loops, told by one triangle of each region between them.
-
-    An edge that loops use twice, there and back, is no border.
-    """
-    n = len(points)
-    key, uses = np.unique(np.sort(loops, axis=1) @ [n, 1], return_counts=True)
-    ends = np.sort(np.stack([F, np.roll(F, -1, axis=1)], axis=-1).reshape(-1, 2), axis=1) @ [n, 1]
-    edge, number = np.unique(ends, return_inverse=True)
-    is_open = ~np.isin(edge, key[uses % 2 == 1])[number]
-    face = np.repeat(np.arange(len(F)), 3)[is_open]
-    region = pieces(len(F) + len(edge), face, len(F) + number[is_open])[: len(F)]
-    area = double_area(*(points[F[:, k]] for k in range(3)))
-    order = np.argsort(-area, kind="stable")
-    number, first = np.unique(region[order], return_index=True)
-    largest = order[first]
-    A, B = points[loops[:, 0]], points[loops[:, 1]]
-    within = inside_loops(A, B, points[F[largest]].mean(axis=1)) & (area[largest] > NOTHING * area.sum())
-    return within[np.searchsorted(number, region)]
+    """(m,) bool: triangles F (m, 3) of points (n, 2) inside the loops (e, 2), see lib.surfaces.loop_kernels."""
+    m, size = len(F), 1 << (2 * (3 * len(F) + len(loops)) + 2).bit_length()
+    table, within = np.full((2, size), loop_kernels.FREE), np.empty(m, dtype=bool)
+    rooms = np.arange(m), np.empty(m), np.empty(m, dtype=np.int64)
+    loop_kernels.inside(np.ascontiguousarray(points), F, np.ascontiguousarray(loops), NOTHING, *table, *rooms, within)
+    return within
 
 
 def _crossed(points, edges):
