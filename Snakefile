@@ -26,6 +26,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # jobs are the parallelism; 
 os.environ["PYTHONPATH"] = os.pathsep.join([workflow.basedir, *filter(None, [os.environ.get("PYTHONPATH")])])
 FIRST = 1  # priority of what others wait for, before the levels of detail, which wait for nothing but the geometry
 MOST_CORES = 8  # of jobs that nothing can run beside, with --cores as many; more share too little of the work
+os.environ.setdefault("BAKE_RUN", uuid.uuid4().hex)  # tells this run's costs from those of earlier ones
 RUN = shlex.join([sys.executable, "-I", "-S", os.path.join(workflow.basedir, "stages")])  # stages/__main__.py
 
 
@@ -51,7 +52,6 @@ except (Refusal, ArtefactError) as error:
 for warning in scene.warnings:
     print(f"warning: {warning}", file=sys.stderr)
 
-os.environ.setdefault("BAKE_RUN", uuid.uuid4().hex)  # tells this run's costs from those of earlier ones
 os.environ["BAKE_SCENE"] = scene.file  # whose settings a job that refuses them names
 
 

@@ -2,12 +2,14 @@
 
 reads   FOLDER/scene.yaml, and the geometry files and pictures it names
 writes  RESULTS/<scene>/preflight.json, settings/, cache/ and pictures/ beside it             (lib.formats.preflight)
+        and what it cost, stages/preflight/cost.json, if nothing was refused
 
 No rule: Snakemake has it done while it reads the Snakefile, if anything has changed since it was done last.
 """
 
 from lib import door
 from lib.formats import preflight, scene_check  # noqa: F401  the reader is loaded where the jobs can share it
+from lib.formats.artefact import write_json
 
 
 def arguments(parser):
@@ -17,7 +19,8 @@ def arguments(parser):
 
 
 def body(args, cost):
-    preflight.make(args.scene, args.overrides, args.results)
+    home = preflight.make(args.scene, args.overrides, args.results)
+    write_json(home / "stages" / "preflight" / "cost.json", cost.as_dict())
 
 
 def main(argv=None):

@@ -100,7 +100,10 @@ def load(folder, overrides=None, results_root="results", make_elsewhere=None):
 
 
 def make(folder, overrides=None, results_root="results"):
-    """Import the scene, write its slices and the outcome; arguments and what it raises as of `load`."""
+    """Import the scene, write its slices and the outcome; arguments and what it raises as of `load`.
+
+    Returns the Path of the scene's results.
+    """
     from lib.formats import artefact, scene_check
 
     at = _place(folder, overrides, results_root)
@@ -119,6 +122,7 @@ def make(folder, overrides=None, results_root="results"):
     outcome = {**found.outcome, "slices": slices}
     record = {"key": at.key, "folder": str(at.absolute), "inputs": found.inputs, "written": written, "outcome": outcome}
     artefact.write_json(at.home / "preflight.json", record)
+    return at.home
 
 
 class _Place(NamedTuple):

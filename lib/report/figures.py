@@ -7,6 +7,7 @@ import numpy as np
 from lib.report import seams, surfaces
 
 STAGES = [
+    "preflight",
     "import_scene",
     "tessellate",
     "sample",

@@ -130,3 +130,10 @@ def test_a_retune_of_the_levels_casts_no_ray(copied):
     assert "scene_LOD1.gltf" not in kept  # of the bake before
     same = [name for name in maps if name.startswith(("maps", "textures"))]
     assert same and {name: kept.get(name) for name in same} == {name: maps[name] for name in same}
+
+
+def test_reading_the_scene_is_among_the_costs(baked):
+    record = json.loads((baked.results / "stages/preflight/cost.json").read_text())
+    assert record["stage"] == "preflight" and record["cpu_seconds"] > 0 and record["rays"] == 0
+    rows = json.loads((baked.results / "report.json").read_text())["stages"]
+    assert rows[0]["stage"] == "preflight" and rows[0]["jobs"] == 1
