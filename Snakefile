@@ -16,7 +16,7 @@ from lib.formats import preflight
 from lib.formats.artefact import ArtefactError
 from lib.formats.rule_settings import lod_levels, n_chunks, rule_settings, short
 from lib.refusal import Refusal
-from lib.stage_code import stage_digests
+from lib.stage_code import listing, stage_digests
 
 from snakemake.utils import min_version
 
@@ -72,6 +72,7 @@ CHUNKS = range(N_CHUNKS)
 LODS = lod_levels(scene.settings["lods"])
 LEVELS = range(len(LODS))
 MAPS = [f"{OUT}/maps/{file}.exr" for file in MAPPED]
+FILES = listing(workflow.basedir)
 LOST_MAPS = [path for path in MAPS if not os.path.exists(path)]
 
 
@@ -81,7 +82,7 @@ def code(stage):
     Params and not inputs: an edit during the run is noticed by the next, old time stamps and a moved checkout do not
     matter, and the terminal is spared a hundred paths a job.
     """
-    return stage_digests(stage, workflow.basedir)
+    return stage_digests(stage, workflow.basedir, FILES)
 
 
 def watched(files):

@@ -54,7 +54,7 @@ def _read(root, path, stamp):
     return source, imported_modules(source, tuple(path.split("/")[:-1]))
 
 
-def _listing(root):
+def listing(root):
     """{path relative to root: (mtime, size)} of every file in lib and stages, caches and hidden ones left out."""
     files, folders = {}, list(PACKAGES)
     while folders:
@@ -81,7 +81,7 @@ def _data_files(path, source, data):
                 yield other
 
 
-def stage_code(stage, root="."):
+def stage_code(stage, root=".", files=None):
     """Files whose edit must re-run a stage.
 
     Parameters
@@ -90,6 +90,8 @@ def stage_code(stage, root="."):
         Name of the stage, its file is stages/<stage>.py.
     root : str
         Folder of the checkout.
+    files : dict
+        `listing` of root, where it is at hand.
 
     Returns
     -------
@@ -103,7 +105,7 @@ def stage_code(stage, root="."):
     start = f"stages/{stage}.py"
     if not os.path.isfile(os.path.join(root, start)):
         raise FileNotFoundError(f"{start}: no such stage")
-    files = _listing(root)
+    files = listing(root) if files is None else files
     data = [path for path in files if not path.endswith(".py")]
     packages = {path.removesuffix("/__init__.py") for path in files if path.endswith("/__init__.py") and files[path][1]}
 
@@ -121,14 +123,14 @@ def stage_code(stage, root="."):
     return sorted(path if root == "." else os.path.join(root, path) for path in reached)
 
 
-def stage_digests(stage, root="."):
+def stage_digests(stage, root=".", files=None):
     """The files of `stage_code`, each as "path digest": its path below root and 12 hex digits of its SHA-256.
 
     As params of a rule they re-run it for an edit, and for nothing else: not for a time stamp or another place of root.
     """
-    files = [os.path.relpath(path, root) for path in stage_code(stage, root)]
-    stamps = _listing(os.fspath(root))
-    return [f"{path} {_digest(os.path.join(root, path), stamps[path])}" for path in files]
+    files = listing(os.fspath(root)) if files is None else files
+    reached = [os.path.relpath(path, root) for path in stage_code(stage, root, files)]
+    return [f"{path} {_digest(os.path.join(root, path), files[path])}" for path in reached]
 
 
 @functools.cache
