@@ -17,12 +17,11 @@ class PointLocation:
     def __init__(self, corner):
         self.corner = np.ascontiguousarray(corner, dtype=np.float64)
         self._side = int(np.clip(np.sqrt(2 * len(self.corner)), 1, MOST_CELLS))
-        self._start = np.zeros(self._side**2 + 2, dtype=np.int64)
-        total = _count(self.corner, self._side, self._start)
-        self._start = np.cumsum(self._start)
-        self._order = np.empty(total, dtype=np.int64)
-        _fill(self.corner, self._side, self._start[1:], self._order)
-        self._start = self._start[:-1].copy()
+        start = np.zeros(self._side**2 + 2, dtype=np.int64)
+        total = _sorted_in(self.corner, self._side, start[2:], np.empty(0, dtype=np.int64))
+        start, self._order = np.cumsum(start), np.empty(total, dtype=np.int64)
+        _sorted_in(self.corner, self._side, start[1:], self._order)
+        self._start = start[:-1].copy()
 
     def at(self, places):
         """(n,) int64: the triangle at each of places (n, 2), -1 outside of all."""
@@ -84,9 +83,11 @@ def highest(corner, k):
     return max(corner[k, 0, 1], max(corner[k, 1, 1], corner[k, 2, 1]))
 
 
-@compiled("f8[:,:,:], i8, i8[:]")
-def _count(corner, side, count):
-    """How many triangles reach into cell c, in count[c + 2], and in all."""
+@compiled("f8[:,:,:], i8, i8[:], i8[:]")
+def _sorted_in(corner, side, start, order):
+    """Put the triangles that reach into cell c at order[start[c]:], in ascending order; start[c] is the end of them
+    then.  Without an order they are counted alone, from start[c] on.  Returns how many there are in all cells.
+    """
     total = 0
     for k in range(len(corner)):
         for j in range(cell_of(lowest(corner, k) - EDGE, side), cell_of(highest(corner, k) + EDGE, side) + 1):
@@ -95,24 +96,11 @@ def _count(corner, side, count):
             if last < first:
                 continue
             for i in range(cell_of(first, side), cell_of(last, side) + 1):
-                count[j * side + i + 2] += 1
+                if len(order):
+                    order[start[j * side + i]] = k
+                start[j * side + i] += 1
                 total += 1
     return total
-
-
-@compiled("f8[:,:,:], i8, i8[:], i8[:]")
-def _fill(corner, side, start, order):
-    """Put the triangles of cell c at order[start[c]:], in ascending order; start[c] is the end of them then."""
-    for k in range(len(corner)):
-        for j in range(cell_of(lowest(corner, k) - EDGE, side), cell_of(highest(corner, k) + EDGE, side) + 1):
-            low, high = j / side - EDGE, (j + 1) / side + EDGE
-            first, last = -reach(corner, k, low, high, -1.0) - EDGE, reach(corner, k, low, high, 1.0) + EDGE
-            if last < first:
-                continue
-            for i in range(cell_of(first, side), cell_of(last, side) + 1):
-                order[start[j * side + i]] = k
-                start[j * side + i] += 1
-    return 0
 
 
 @inlined
