@@ -62,3 +62,11 @@ def test_a_sliver_that_is_nothing_beside_the_rest_is_not_inside():
     loops = np.concatenate([ring(0), [[4, 5], [5, 6], [6, 4]]])
     F = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6]])
     assert _in_loops(points, F, loops).tolist() == [True, True, False]
+
+
+def test_a_triangle_without_area_belongs_to_its_neighbour_across_an_edge_there_and_back():
+    """A square, one side of which runs through a point in its middle, and straight as well, there and back."""
+    points = np.concatenate([square(1), [[1.0, 0]]])
+    loops = np.array([[0, 1], [1, 4], [4, 2], [2, 3], [3, 0], [1, 2], [2, 1]])
+    F = np.array([[1, 4, 2], [0, 1, 2], [0, 2, 3]])
+    assert _in_loops(points, F, loops).tolist() == [True, True, True]
