@@ -6,7 +6,7 @@ import pytest
 from lib.maps.fill import one_deep
 from lib.nurbs.surface import bilinear
 from lib.surfaces.trimmed import TrimmedSurface
-from tests.rooms import baked, corner_of, cube, cube_mesh
+from tests.rooms import baked, corner_of, cube, cube_mesh, world_of
 from tests.shapes import rectangle
 
 
@@ -86,3 +86,11 @@ def test_both_sides_of_a_sheet(tmp_path):
     front, back = (maps[name][0].sum(axis=2)[..., 0] for name in both)
     assert back.mean() == pytest.approx(4 * front.mean(), rel=0.03)
     assert front.min() > 0.05
+
+
+def test_the_back_of_a_trimmed_surface_fills_the_same_part_of_its_map():
+    both = {"sheet": (half_square(), {}), "sheet/back": (half_square(), {"flip": True, "front": "sheet"})}
+    world = world_of(both | {"lamp": (rectangle([0, 0, 2], [0, 1, 0], [1, 0, 0]), {"E": 1.0})})
+    front, back = (world.domain(world.scene.names.index(name)) for name in both)
+    assert front.uv.tobytes() == back.uv.tobytes() and front.is_border.tobytes() == back.is_border.tobytes()
+    assert (front.face_at(np.array([[0.1, 0.1], [0.9, 0.9]])) >= 0).tolist() == [True, False]

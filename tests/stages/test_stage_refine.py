@@ -9,7 +9,7 @@ from lib.elements.balance import is_balanced
 from lib.formats import artefact, samples, trees
 from lib.nurbs.shape import transformed
 from stages import refine
-from tests.rooms import Baked, cube, scene_of
+from tests.rooms import Baked, cube, cube_mesh, scene_of
 from tests.shapes import cylinder, rectangle
 
 FLOOR, LAMP, SCREEN, TUBE = 0, 1, 2, 3
@@ -195,3 +195,24 @@ def test_the_other_half_is_refused(one, tmp_path, capsys):
     argv = ["--half", "indirect", "--chunk", "0", "--chunks", "1", "--out", str(tmp_path / "x.npz")]
     assert bake.run(refine, "refine", *files, *argv) == 1
     assert "holds indirect trees, expected direct" in capsys.readouterr().err
+
+
+def test_less_effort_takes_its_share_of_shadow_rays_and_the_root_of_it_of_gather_rays(tmp_path):
+    """A room that is one mesh, with a lamp in it: a quarter of the first and half of the second, for as many samples,
+    since only cells that hold two charts are divided.
+    """
+    surfaces = {"lamp": (rectangle([0.4, 0.4, 0.9], [0, 0.2, 0], [0.2, 0, 0]), {"E": 10.0, "is_black": True})}
+    bake, _ = refined(tmp_path, surfaces | {"room": (cube_mesh(), {})}, halves=(), max_level=5)
+    same_samples = {"t_direct": 1e9, "t_indirect": 1e9, "gather_rays": 512, "shadow_rays": [16, 16]}
+    rays = {}
+    for effort in (1.0, 0.25):
+        bake.settings["refine"] |= same_samples | {"chart_effort": effort, "chart_coarser": 0}
+        for half, light in (("direct", ["--samples", "samples_0"]), ("indirect", ["--direct", "direct_0"])):
+            files = [light[0], bake.path(light[1])]
+            for name in ("casters", "solution"):
+                files += [f"--{name}", bake.path(name)]
+            files += ["--half", half, "--chunk", "0", "--chunks", "1", "--out", bake.path(half, 0)]
+            assert bake.run(refine, "refine", *files, log=["--cost", str(tmp_path / "cost.json")]) == 0
+            rays[half, effort] = artefact.read_json(tmp_path / "cost.json")["rays"]
+    assert rays["direct", 0.25] < 0.7 * rays["direct", 1.0]  # the rest asks whether dark samples are buried
+    assert 0.45 < rays["indirect", 0.25] / rays["indirect", 1.0] < 0.6
