@@ -10,13 +10,15 @@ import pickle
 import signal
 import sys
 import tempfile
+import traceback
+import warnings
 from contextlib import suppress
 
 FEW = 48  # items of some milliseconds that are not worth a process
 WIDTH = 4  # bytes of an item's number in the queue
-MOST = 8192  # numbers in the queue, which holds 64 kB
+MOST = 1024  # numbers in the queue: 4 kB, which every pipe holds
 
-_allowed = 1
+_allowed = 1  # of the process, as OMP_NUM_THREADS would be: how many it is changes no result, and lib knows no settings
 
 
 def allow(cores):
@@ -40,8 +42,8 @@ def mapped(function, items, few=FEW, together=1):
     if workers < 2 or len(items) <= few or not hasattr(os, "fork"):
         return [function(item) for item in items]
     step = max(together, -(-len(items) // MOST))
-    queue = _queue(range(0, len(items), step))
     files, children = [tempfile.TemporaryFile() for _ in range(workers - 1)], []
+    queue = _queue(range(0, len(items), step))
     sys.stdout.flush()
     sys.stderr.flush()
     try:
@@ -63,11 +65,8 @@ def mapped(function, items, few=FEW, together=1):
             file.close()
     if len(done) < len(items):
         raise RuntimeError("a process of this job ended before its work was done")
-    for k in range(len(items)):
-        if not done[k][0]:
-            function(items[k])  # raises it again, from where it stands in the code
-            raise done[k][1]
-    return [done[k][1] for k in range(len(items))]
+    # What failed is done again here, and raises from where it stands in the code.
+    return [done[k][1] if done[k][0] else function(items[k]) for k in range(len(items))]
 
 
 def _queue(numbers):
@@ -79,20 +78,22 @@ def _queue(numbers):
 
 
 def _worked(queue, function, items, step):
-    """(number, (is_done, result or exception)) of the items that this process got hold of."""
+    """(number, (is_done, result)) of the items that this process got hold of."""
     while number := os.read(queue, WIDTH):
         first = int.from_bytes(number, sys.byteorder)
         for k in range(first, min(first + step, len(items))):
             try:
                 yield k, (True, function(items[k]))
-            except Exception as error:
-                yield k, (False, error)
+            except Exception:
+                yield k, (False, None)
 
 
 def _forked(queue, function, items, step, file):
     """The number of a child that works and writes what came out into `file`."""
     parent = os.getpid()
-    child = os.fork()
+    with warnings.catch_warnings():  # of threads that the child will not have: see above
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
     if child:
         return child
     status = 1
@@ -103,8 +104,10 @@ def _forked(queue, function, items, step, file):
                 break
         file.flush()
         status = 0
-    except BaseException:  # told by the status: what stopped this one stops the parent as well, or it is out of room
+    except KeyboardInterrupt:  # the parent hears it too
         pass
+    except BaseException:  # no room for what came out, or it can not be sent
+        traceback.print_exc()
     finally:
         os._exit(status)
 

@@ -5,8 +5,7 @@ reads   scene.npz, casters.npz, solution.npz, and chunk_<c>.npz of sample (direc
 writes  direct_<c>.npz or indirect_<c>.npz          (lib.formats.trees)
 
 settings: seed, tolerance, tolerances, relative_to, t_direct, t_indirect, base_indirect, top, gather_rays, shadow_rays,
-smallest_cell, chart_effort, chart_coarser,
-bounces
+smallest_cell, chart_effort, chart_coarser, bounces
 """
 
 import numpy as np

@@ -76,10 +76,21 @@ def test_a_process_that_is_killed_is_no_result(three):
             os.kill(os.getpid(), signal.SIGKILL)
         return k
 
+    before = children()
     with pytest.raises(RuntimeError, match="status -9"):
         forks.mapped(dies, range(100))
-    with pytest.raises(ChildProcessError):
-        os.waitpid(-1, os.WNOHANG)
+    assert children() == before
+
+
+def children():
+    """Numbers of the children of this process."""
+    return Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
+
+
+def test_what_can_not_be_sent_ends_the_job_and_says_why(three, capfd):
+    with pytest.raises(RuntimeError, match="status 1"):
+        forks.mapped(lambda k: time.sleep(0.002) or (lambda: k), range(100))
+    assert "pickle" in capfd.readouterr().err
 
 
 def test_none_works_on_for_a_process_that_is_gone(tmp_path):

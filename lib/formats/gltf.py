@@ -84,7 +84,7 @@ class _Gltf(g.GLTF2):
             key: "[\n" + ",\n".join(map(encode, value)) + "\n]" if isinstance(value, list) else encode(value)
             for key, value in filled(self).items()
         }
-        return "{\n" + ",\n".join(f"{encode(key)}: {text}" for key, text in listed.items()) + "\n}\n"
+        return "{\n" + ",\n".join(f"{encode(key)}: {text}" for key, text in listed.items()) + "\n}"
 
 
 class _Document:

@@ -105,7 +105,9 @@ def chosen_quality(bake, mesh_cells=0):
     by_hand = {"n_elements": "elements", "rays_per_element": "rays_per_element", "gather_rays": "gather_rays"}
     q |= {name: bake[key] for name, key in by_hand.items() if bake[key] != "auto"}
     if bake["shadow_rays"] != "auto":
-        q |= {"shadow_rays": bake["shadow_rays"], "first_shadow_rays": bake["shadow_rays"], "chart_effort": 1.0}
+        q |= {"shadow_rays": bake["shadow_rays"], "first_shadow_rays": bake["shadow_rays"]}
+    if bake["shadow_rays"] != "auto" or bake["gather_rays"] != "auto":
+        q["chart_effort"] = 1.0  # rays asked for are those of meshes too
     return q
 
 

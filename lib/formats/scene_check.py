@@ -93,7 +93,9 @@ def run(folder, overrides=None, pictures_folder=None):
         "mesh_cells": sum(
             round(one.area / scene_import.finest_cell(one.area, largest) ** 2)
             for one in placed
-            if isinstance(one.surface, Mesh) and not table[one.name]["is_black"]
+            if isinstance(one.surface, Mesh)
+            and not table[one.name]["is_black"]
+            and table[one.name]["role"] != "cast_only"
         ),
         "largest": largest,
         "warnings": warnings,

@@ -147,14 +147,17 @@ def with_charts(placed, entries):
     for of, (laid, is_refused) in zip(largest_first, forks.mapped(atlas, largest_first, few=1), strict=True):
         for one in asked[of][2]:
             if one.front is None:
-                if is_refused:
-                    refused.setdefault(entries[one.entry]["file"], []).append(one.name)
+                refused[one.name] = is_refused
                 flat = replace(one.part.surface, uv=laid.uv, chart=laid.chart, level=laid.level)
                 out[one.name] = transformed(flat, one.M)
     placed = [
         replace(one, surface=out[one.front or one.name]) if isinstance(one.surface, Mesh) else one for one in placed
     ]
-    return placed, [OWN_REFUSED.format(file, listed(found)) for file, found in refused.items()]
+    found = {}
+    for one in meshes:
+        if refused.get(one.name):
+            found.setdefault(entries[one.entry]["file"], []).append(one.name)
+    return placed, [OWN_REFUSED.format(file, listed(names)) for file, names in found.items()]
 
 
 def finest_cell(area, scale):

@@ -102,20 +102,23 @@ class _Part:
 
 def _patches(parts, materials, report, only, trimmed):
     """Patches of the selected parts, and the numbers of the trimmed ones that are skipped."""
-    chosen, patches, left_out = [], [], []
+    chosen, refused, patches, left_out = [], set(), [], []
     for number, part in enumerate(parts, 1):
         labels = (*part.item.labels, str(number), names.padded(number, len(parts)))
         if not is_selected(labels, only):
             continue
         if not part.is_whole and trimmed == "skip":
             left_out.append(number)
-        elif not part.is_whole and trimmed == "refuse":
+            continue
+        chosen.append((number, part, labels))
+        if not part.is_whole and trimmed == "refuse":
+            refused.add(number)
+    made = iter(_made([part for number, part, _ in chosen if number not in refused], trimmed == "skip"))
+    for number, part, labels in chosen:
+        if number in refused:
             report.add(f"{TRIMMED} (it is on layer {part.item.layer})", number)
-        else:
-            chosen.append((number, part, labels))
-    made = _made([part for _, part, _ in chosen], trimmed == "skip")
-    for (number, part, labels), surface in zip(chosen, made, strict=True):
-        surface = report.surface(surface, number)
+            continue
+        surface = report.surface(next(made), number)
         if surface is not None:
             if isinstance(part.item.geometry, rhino3dm.Mesh) and len(part.item.geometry.VertexColors):
                 report.coloured.append(report.of(number))

@@ -1,8 +1,8 @@
 """Levels of detail of triangle meshes: how far they may be thinned for a tolerance or a count.
 
 What collapses cost is found once (`Ladder.known`), before any level is asked for: levels all the way down are measured,
-at most ROUGH times apart where distances matter.  For a tolerance a few more between two of these are, until it is met
-by a level with NEAR times as many triangles as needed.
+at most ROUGH times apart where distances matter.  Who asks for a tolerance measures some between two of these, TRIALS
+at most, to come within NEAR times the triangles that it needs.
 """
 
 from dataclasses import dataclass, replace
@@ -15,7 +15,7 @@ from lib.surfaces.pieces import pieces
 from lib.surfaces.rows import numbered
 
 STEP = 4.0  # times fewer triangles, from one measured level to the next
-ROUGH = 2.0  # as many times more triangles are near enough in the survey; who asks for a level measures a few more
+ROUGH = 2.0  # as many times more triangles are near enough in the survey
 NEAR = 1.1  # times more triangles than needed is near enough
 SPARE = 0.005  # of all meshes' triangles: that many more than needed, over all groups, are near enough too ...
 ROUGHLY = 8  # ... and as many times that in the survey

@@ -31,9 +31,9 @@ class Quality:
     """n_elements in the scene and rays_per_element for their rows; gather_rays K; shadow_rays (n0, n1), the same for
     every tolerance at first_shadow_rays, which the elements see;
     thresholds t_direct, t_indirect in units of the scene's mean irradiance; levels of the two trees (base, top), and
-    the smallest_cell that they divide, in units of the scene's largest side; chart_effort, the share of the rays
-    that samples on meshes get (below 1 they are not doubted, see lib.radiosity.refine), and chart_coarser, levels by
-    which the maps of meshes end above the finest cells of their atlas."""
+    the smallest_cell that they divide, in units of the scene's largest side; chart_effort, the share of shadow rays
+    that samples on meshes get (below 1 they are not doubted, see lib.radiosity.refine), of gather rays the root of it;
+    chart_coarser, levels by which the maps of meshes end above the finest cells of their atlas."""
 
     n_elements: int
     rays_per_element: int

@@ -19,8 +19,8 @@ SMOOTH = 0.25  # dividing a cell once more leaves a quarter of the departure of 
 
 
 class Effort(NamedTuple):
-    """What surfaces (n,) are worth: share of the usual rays, and levels by which their trees end above the cells of an
-    atlas."""
+    """What surfaces (n,) are worth: share of the usual shadow rays, of gather rays its root, and levels by which their
+    trees end above the cells of an atlas."""
 
     share: np.ndarray
     coarser: np.ndarray

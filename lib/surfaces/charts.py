@@ -235,7 +235,7 @@ def _next_density(tried, room):
         low, (first, *_) = 2 * PADDING, tried[0]
         if len(tried) > 1 and tried[-1][1] < tried[-2][1]:  # much of it is the space between charts
             slope = (tried[-2][1] - tried[-1][1]) / (tried[-2][0] - tried[-1][0])
-            density = over[0] - (over[1] - 0.98 * room) / slope
+            density = max(over[0] - (over[1] - 0.98 * room) / slope, 0.25 * over[0])
             return density if density * MOST_COARSER > first or room == 2**MOST_LEVEL else None
         return over[0] * max(0.97 * (room - low) / (over[1] - low), 0.25)
     if over[0] == np.inf:

@@ -22,7 +22,9 @@ def domain_of(surface, cells, part=None):
     uv, border = part or part_of(surface)
     if isinstance(surface, Mesh):
         return Domain(surface.uv, surface.chart, cells, border)
-    return Domain(uv, np.full(len(uv), ONE_CHART), cells, border) if len(uv) else None
+    if isinstance(surface, TrimmedSurface) and not is_whole(surface):
+        return Domain(uv, np.full(len(uv), ONE_CHART), cells, border)
+    return None
 
 
 def part_of(surface):

@@ -12,7 +12,7 @@ EDGE = 1e-9  # of a triangle's height: places so little outside still belong to 
 
 
 class PointLocation:
-    """Triangles (m, 3, 2) in [0, 1] x [0, 1], wound either way, that do not overlap."""
+    """Triangles (m, 3, 2) in [0, 1] x [0, 1], wound either way; where they overlap, the clearest counts."""
 
     def __init__(self, corner):
         self.corner = np.ascontiguousarray(corner, dtype=np.float64)

@@ -62,6 +62,8 @@ def test_shadow_rays_fixed_by_hand_are_those_of_meshes_too():
     assert json.loads(rule_settings(coarse)["refine"])["chart_effort"] < 1
     fixed = json.loads(rule_settings(settings(bake__tolerance=0.02, bake__shadow_rays=[16, 32]))["refine"])
     assert fixed["chart_effort"] == 1 and fixed["shadow_rays"] == [16, 32]
+    fixed = json.loads(rule_settings(settings(bake__tolerance=0.02, bake__gather_rays=512), mesh_cells=1e7)["refine"])
+    assert fixed["chart_effort"] == 1 and fixed["gather_rays"] == 512
 
 
 def test_a_level_is_a_share_of_the_first_if_that_is_none():

@@ -194,3 +194,5 @@ def test_a_size_that_does_not_fit_is_met_along_the_line_of_those_tried():
     assert _next_density(tried(0.1, 0.095), 128) == pytest.approx((0.98 * 128 - 40) / 1000, rel=1e-12)
     assert _next_density(tried(0.2, 0.15), 128) is None
     assert _next_density(tried(0.088), 128) is None  # full enough
+    flat = [(0.1, 3000.0, None), (0.09, 2950.0, None)]  # the line would end below nothing
+    assert _next_density(flat, 2**MOST_LEVEL) == 0.25 * 0.09
