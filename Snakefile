@@ -24,9 +24,9 @@ min_version("9.0")
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # jobs are the parallelism; idle threads cost start-up
 os.environ["PYTHONPATH"] = os.pathsep.join([workflow.basedir, *filter(None, [os.environ.get("PYTHONPATH")])])
-FIRST = 1  # priority of what others wait for, before the levels of detail, which wait for nothing but the geometry
 MOST_CORES = 8  # of jobs that nothing can run beside, with --cores as many; more share too little of the work
 os.environ.setdefault("BAKE_RUN", uuid.uuid4().hex)  # tells this run's costs from those of earlier ones
+TOLD = " --log {log.text:q} --cost {log.cost:q} --threads {threads}"  # every job
 RUN = shlex.join([sys.executable, "-I", "-S", os.path.join(workflow.basedir, "stages")])  # stages/__main__.py
 
 
@@ -85,6 +85,11 @@ def code(stage):
     return stage_digests(stage, workflow.basedir, FILES)
 
 
+def records(stage, of=""):
+    """Where a job writes what it says and what it costs; of : what tells it from others of its stage."""
+    return {"text": f"{STAGE}/{stage}/log{of}.txt", "cost": f"{STAGE}/{stage}/cost{of}.json"}
+
+
 def watched(files):
     """The user's files as inputs: relative below the working folder, so that it can be moved.
 
@@ -130,14 +135,13 @@ rule import_scene:
     output:
         f"{STAGE}/import_scene/scene.npz",
     log:
-        text=f"{STAGE}/import_scene/log.txt",
-        cost=f"{STAGE}/import_scene/cost.json",
+        **records("import_scene"),
     threads: MOST_CORES
     params:
         *code("import_scene"),
         slice=scene.slices["geometry"],
     shell:
-        "{RUN} import_scene --scene-slice {params.slice:q} --out {output:q} --log {log.text:q} --cost {log.cost:q} --threads {threads}"
+        "{RUN} import_scene --scene-slice {params.slice:q} --out {output:q}" + TOLD
 
 
 rule tessellate:
@@ -146,15 +150,13 @@ rule tessellate:
     output:
         f"{STAGE}/tessellate/casters.npz",
     log:
-        text=f"{STAGE}/tessellate/log.txt",
-        cost=f"{STAGE}/tessellate/cost.json",
+        **records("tessellate"),
     threads: MOST_CORES
     params:
         *code("tessellate"),
         settings=SETTINGS["tessellate"],
     shell:
-        "{RUN} tessellate --scene {input.scene:q} --settings {params.settings:q} --out {output:q}"
-        " --log {log.text:q} --cost {log.cost:q} --threads {threads}"
+        "{RUN} tessellate --scene {input.scene:q} --settings {params.settings:q} --out {output:q}" + TOLD
 
 
 rule sample:
@@ -164,16 +166,14 @@ rule sample:
     output:
         f"{STAGE}/sample/chunk_{{c}}.npz",
     log:
-        text=f"{STAGE}/sample/log_{{c}}.txt",
-        cost=f"{STAGE}/sample/cost_{{c}}.json",
-    priority: FIRST
+        **records("sample", "_{c}"),
     params:
         *code("sample"),
         settings=SETTINGS["sample"],
         chunks=N_CHUNKS,
     shell:
         "{RUN} sample --scene {input.scene:q} --casters {input.casters:q} --chunk {wildcards.c} --chunks {params.chunks}"
-        " --settings {params.settings:q} --out {output:q} --log {log.text:q} --cost {log.cost:q}"
+        " --settings {params.settings:q} --out {output:q}" + TOLD
 
 
 rule shoot:
@@ -185,17 +185,15 @@ rule shoot:
         solution=f"{STAGE}/shoot/solution.npz",
         plot=f"{STAGE}/shoot/convergence.svg",
     log:
-        text=f"{STAGE}/shoot/log.txt",
-        cost=f"{STAGE}/shoot/cost.json",
-    priority: FIRST
+        **records("shoot"),
     params:
         *code("shoot"),
         settings=SETTINGS["shoot"],
         materials=scene.slices["materials"],
     shell:
         "{RUN} shoot --scene {input.scene:q} --casters {input.casters:q} --samples {input.samples:q}"
-        " --materials {params.materials:q} --settings {params.settings:q} --out {output.solution:q} --plot {output.plot:q}"
-        " --log {log.text:q} --cost {log.cost:q}"
+        " --materials {params.materials:q} --settings {params.settings:q}"
+        " --out {output.solution:q} --plot {output.plot:q}" + TOLD
 
 
 rule refine_direct:
@@ -207,9 +205,7 @@ rule refine_direct:
     output:
         f"{STAGE}/refine/direct_{{c}}.npz",
     log:
-        text=f"{STAGE}/refine/log_direct_{{c}}.txt",
-        cost=f"{STAGE}/refine/cost_direct_{{c}}.json",
-    priority: FIRST
+        **records("refine", "_direct_{c}"),
     params:
         *code("refine"),
         settings=SETTINGS["refine"],
@@ -217,7 +213,7 @@ rule refine_direct:
     shell:
         "{RUN} refine --half direct --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
         " --samples {input.samples:q} --chunk {wildcards.c} --chunks {params.chunks} --settings {params.settings:q}"
-        " --out {output:q} --log {log.text:q} --cost {log.cost:q}"
+        " --out {output:q}" + TOLD
 
 
 rule refine_indirect:
@@ -229,9 +225,7 @@ rule refine_indirect:
     output:
         f"{STAGE}/refine/indirect_{{c}}.npz",
     log:
-        text=f"{STAGE}/refine/log_indirect_{{c}}.txt",
-        cost=f"{STAGE}/refine/cost_indirect_{{c}}.json",
-    priority: FIRST
+        **records("refine", "_indirect_{c}"),
     params:
         *code("refine"),
         settings=SETTINGS["refine"],
@@ -239,7 +233,7 @@ rule refine_indirect:
     shell:
         "{RUN} refine --half indirect --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
         " --direct {input.direct:q} --chunk {wildcards.c} --chunks {params.chunks} --settings {params.settings:q}"
-        " --out {output:q} --log {log.text:q} --cost {log.cost:q}"
+        " --out {output:q}" + TOLD
 
 
 rule balance_resample:
@@ -251,16 +245,13 @@ rule balance_resample:
     output:
         f"{STAGE}/balance_resample/chunk_{{c}}.npz",
     log:
-        text=f"{STAGE}/balance_resample/log_{{c}}.txt",
-        cost=f"{STAGE}/balance_resample/cost_{{c}}.json",
-    priority: FIRST
+        **records("balance_resample", "_{c}"),
     params:
         *code("balance_resample"),
         settings=SETTINGS["balance_resample"],
     shell:
         "{RUN} balance_resample --scene {input.scene:q} --solution {input.solution:q} --direct {input.direct:q}"
-        " --indirect {input.indirect:q} --settings {params.settings:q} --out {output:q}"
-        " --log {log.text:q} --cost {log.cost:q}"
+        " --indirect {input.indirect:q} --settings {params.settings:q} --out {output:q}" + TOLD
 
 
 rule apply_base_texture:
@@ -272,9 +263,7 @@ rule apply_base_texture:
         textured=f"{STAGE}/apply_base_texture/textured.npz",
         maps=MAPS,
     log:
-        text=f"{STAGE}/apply_base_texture/log.txt",
-        cost=f"{STAGE}/apply_base_texture/cost.json",
-    priority: FIRST
+        **records("apply_base_texture"),
     params:
         *code("apply_base_texture"),
         settings=SETTINGS["apply_base_texture"],
@@ -284,7 +273,7 @@ rule apply_base_texture:
     shell:
         "{RUN} apply_base_texture --scene {input.scene:q} --maps {input.maps:q} --materials {params.materials:q}"
         " --textures {params.slice:q} --settings {params.settings:q} --maps-folder {params.folder:q}"
-        " --out {output.textured:q} --log {log.text:q} --cost {log.cost:q}"
+        " --out {output.textured:q}" + TOLD
 
 
 rule budget_reduce:
@@ -295,15 +284,13 @@ rule budget_reduce:
         textures=f"{STAGE}/budget_reduce/textures.npz",
         table=f"{STAGE}/budget_reduce/budget.json",
     log:
-        text=f"{STAGE}/budget_reduce/log.txt",
-        cost=f"{STAGE}/budget_reduce/cost.json",
-    priority: FIRST
+        **records("budget_reduce"),
     params:
         *code("budget_reduce"),
         settings=SETTINGS["budget_reduce"],
     shell:
         "{RUN} budget_reduce --maps {input.textured:q} --casters {input.casters:q} --settings {params.settings:q}"
-        " --out {output.textures:q} --table {output.table:q} --log {log.text:q} --cost {log.cost:q}"
+        " --out {output.textures:q} --table {output.table:q}" + TOLD
 
 
 if scene.has_meshes:
@@ -315,14 +302,11 @@ if scene.has_meshes:
         output:
             f"{STAGE}/thin_meshes/ladder.npz",
         log:
-            text=f"{STAGE}/thin_meshes/log.txt",
-            cost=f"{STAGE}/thin_meshes/cost.json",
-        priority: FIRST
+            **records("thin_meshes"),
         params:
             *code("thin_meshes"),
         shell:
-            "{RUN} thin_meshes --scene {input.scene:q} --casters {input.casters:q} --out {output:q}"
-            " --log {log.text:q} --cost {log.cost:q}"
+            "{RUN} thin_meshes --scene {input.scene:q} --casters {input.casters:q} --out {output:q}" + TOLD
 
 
 def finest_level(wildcards):
@@ -341,8 +325,7 @@ rule lod_export:
     output:
         f"{STAGE}/lod_export/lod_{{k}}.npz",
     log:
-        text=f"{STAGE}/lod_export/log_{{k}}.txt",
-        cost=f"{STAGE}/lod_export/cost_{{k}}.json",
+        **records("lod_export", "_{k}"),
     params:
         *code("lod_export"),
         level=lambda wildcards: LODS[int(wildcards.k)][0],
@@ -351,9 +334,9 @@ rule lod_export:
         ladder=["--ladder", f"{STAGE}/thin_meshes/ladder.npz"] if scene.has_meshes else [],
         reconstruction=SETTINGS["reconstruction"],
     shell:
-        "{RUN} lod_export --scene {input.scene:q} --casters {input.casters:q} --level {params.level:q} {params.finest:q} --units m"
-        " --level-index {wildcards.k} {params.ladder:q} {params.more:q} --reconstruction {params.reconstruction:q} --out {output:q}"
-        " --log {log.text:q} --cost {log.cost:q}"
+        "{RUN} lod_export --scene {input.scene:q} --casters {input.casters:q} --level {params.level:q}"
+        " {params.finest:q} --units m --level-index {wildcards.k} {params.ladder:q} {params.more:q}"
+        " --reconstruction {params.reconstruction:q} --out {output:q}" + TOLD
 
 
 rule package:
@@ -368,8 +351,7 @@ rule package:
         levels=[f"{OUT}/scene_LOD{k}.{end}" for k in LEVELS for end in ("gltf", "bin")],
         manifest=f"{OUT}/lods.json",
     log:
-        text=f"{STAGE}/package/log.txt",
-        cost=f"{STAGE}/package/cost.json",
+        **records("package"),
     threads: MOST_CORES
     params:
         *code("package"),
@@ -378,8 +360,8 @@ rule package:
         results=OUT,
     shell:
         "{RUN} package --scene {input.scene:q} --casters {input.casters:q} --textures {input.textures:q}"
-        " --budget {input.budget:q} --lods {input.lods:q} --materials {params.materials:q} --settings {params.settings:q} --results {params.results:q}"
-        " --log {log.text:q} --cost {log.cost:q} --threads {threads}"
+        " --budget {input.budget:q} --lods {input.lods:q} --materials {params.materials:q}"
+        " --settings {params.settings:q} --results {params.results:q}" + TOLD
 
 
 rule report:
@@ -397,8 +379,7 @@ rule report:
         html=f"{OUT}/report.html",
         json=f"{OUT}/report.json",
     log:
-        text=f"{STAGE}/report/log.txt",
-        cost=f"{STAGE}/report/cost.json",
+        **records("report"),
     threads: 2
     params:
         *code("report"),
@@ -408,4 +389,8 @@ rule report:
         "{RUN} report --results {params.results:q} --scene {input.scene:q} --casters {input.casters:q}"
         " --solution {input.solution:q} --direct {input.direct:q} --indirect {input.indirect:q} --maps {input.maps:q}"
         " --textures {input.textures:q} --budget {input.budget:q} --lods {input.lods:q} --settings {params.settings:q}"
-        " --out-html {output.html:q} --out-json {output.json:q} --log {log.text:q} --cost {log.cost:q} --threads {threads}"
+        " --out-html {output.html:q} --out-json {output.json:q}" + TOLD
+
+
+for each in workflow.rules:  # levels of detail wait for nothing but the geometry: what others wait for goes first
+    each.priority = int(each.name != "lod_export")
