@@ -1,5 +1,6 @@
 # From a scene folder to its bake: snakemake --cores 2 --config scene=FOLDER [SETTING=VALUE ...]
 # Rules read their slice of the settings as params, so that a changed setting re-runs the stages that read it and no others.
+import gc
 import json
 import os
 import shlex
@@ -9,6 +10,7 @@ import threading
 import uuid
 
 sys.path.insert(0, workflow.basedir)
+gc.freeze()  # Snakemake is loaded and stays: to look for garbage in it, last when it ends, takes 0.2 s
 
 from lib import warm_start
 from lib.door import stopped
