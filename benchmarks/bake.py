@@ -24,14 +24,16 @@ APART = ("package", "report")  # counted beside the pipeline: they make the file
 def bake(folder, work, cores=2, settings=None):
     """Bake the scene `folder` from nothing, in the working folder `work`: (its results folder, dict of figures).
 
-    cpu : all processes, less the jobs of APART; apart : those; scheduling : Snakemake, shells, interpreters and
-    imports, all that no job accounts for; stages : CPU seconds and rays by stage.
+    cpu, wall, peak_mb : of a run that ends before APART; apart : CPU seconds of the run that adds them; scheduling :
+    Snakemake, shells, interpreters and imports, all of the first run that no job accounts for; stages : CPU seconds
+    and rays by stage.
     """
     shutil.rmtree(work, ignore_errors=True)
     Path(work).mkdir(parents=True)
     given = [f"{key}={value}" for key, value in (settings or {}).items()]
     command = [*snakemake(work, cores), "--quiet", "all", "--config", f"scene={folder}", *given]
-    spent = measure.run(command, log=Path(work) / "log.txt")
+    spent = measure.run([*command, "--omit-from", APART[0]], log=Path(work) / "log.txt")
+    apart = measure.run(command, log=Path(work) / "log_apart.txt").cpu
     results = Path(work) / "results" / cleaned(Path(folder).name)
     stages, seconds, jobs, rays, peak = {}, 0.0, 0, 0, 0.0
     for path in sorted((results / "stages").glob("*/cost*.json")):
@@ -42,13 +44,12 @@ def bake(folder, work, cores=2, settings=None):
         row["jobs"] += 1
         row["cpu"] += cost["cpu_seconds"]
         row["rays"] += cost["rays"]
-        seconds += cost["cpu_seconds"]
+        seconds += cost["cpu_seconds"] if name not in APART else 0.0
         rays += cost["rays"]
         jobs += 1
         peak = max(peak, cost["peak_mb"])
-    apart = sum(stages[name]["cpu"] for name in APART if name in stages)
     figures = {
-        "cpu": spent.cpu - apart,
+        "cpu": spent.cpu,
         "apart": apart,
         "wall": spent.wall,
         "scheduling": spent.cpu - seconds,

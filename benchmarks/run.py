@@ -1,8 +1,8 @@
 """Error against CPU seconds on the two reference scenes, ours and the peers', in one run: `make bench`.
 
 Ours: whole bakes from an empty folder through Snakemake, every process counted (user + system); `package` and
-`report`, which make the files people open and not the light, are counted apart.  The irradiance is that of
-maps/*.exr, B over rho_avg, read bilinearly at the reference points (benchmarks/reference/README.md); points on the
+`report`, which make the files people open and not the light, are a second run, counted apart.  The irradiance is that
+of maps/*.exr, B over rho_avg, read bilinearly at the reference points (benchmarks/reference/README.md); points on the
 lights are none.  Run k of --repeat takes seed k, the table is medians.
 
 Peers, where their packages are installed in the Python of --peers (pip install '.[bench]' in an environment of its

@@ -84,8 +84,8 @@ def markdown(machine, rows, scenes):
         "## This baker, whole pipeline",
         "",
         "CPU: from nothing to maps, textures and levels of detail, Snakemake included,"
-        " `package` and `report` apart. Of it, start: Snakemake, shells, interpreters and imports,"
-        " all that no job accounts for.",
+        " without `package` and `report`, which a second run adds (apart, with its own start)."
+        " Start: Snakemake, shells, interpreters and imports, all that no job accounts for.",
         "",
         "| scene | setting | RMSE, % | 95 %, % | bias, % | RMSE by area, % | as estimated, % | CPU s"
         " | start | apart | wall s"
