@@ -110,24 +110,23 @@ def summed(seen, t, K, H, deviation, reach):
     together, largest of the three, (n,); harmonic mean of the distances t, (n,)."""
     C = seen.shape[1]
     for i in range(len(H)):
-        first, largest = i * K, 0.0
-        for c in range(min(C, 3)):
-            total, square = 0.0, 0.0
-            for r in range(first, first + K):
-                value = 0.0
-                for g in range(c, C, 3):
-                    value += seen[r, g]
-                total += value
-                square += value * value
-            largest = max(largest, (square - total * total / K) / K)
-            for g in range(c, C, 3):
+        first = i * K
+        x, y, z, xx, yy, zz, nearness = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for r in range(first, first + K):
+            red, green, blue = 0.0, 0.0, 0.0
+            for g in range(0, C, 3):
+                red, green, blue = red + seen[r, g], green + seen[r, g + 1], blue + seen[r, g + 2]
+            x, y, z = x + red, y + green, z + blue
+            xx, yy, zz = xx + red * red, yy + green * green, zz + blue * blue
+            nearness += ONE / max(t[r], CLOSEST)
+        largest = max(xx - x * x / K, yy - y * y / K, zz - z * z / K, 0.0) / K
+        H[i, 0], H[i, 1], H[i, 2] = x / K, y / K, z / K
+        if C > 3:
+            for g in range(C):
                 own = 0.0
                 for r in range(first, first + K):
                     own += seen[r, g]
                 H[i, g] = own / K
-        nearness = 0.0
-        for r in range(first, first + K):
-            nearness += ONE / max(t[r], CLOSEST)
         deviation[i] = np.sqrt(largest)
         reach[i] = K / nearness
     return 0

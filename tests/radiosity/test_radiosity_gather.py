@@ -136,7 +136,7 @@ def test_sums_over_the_rays_of_a_sample():
     assert np.abs(deviation - groups.std(axis=1).max(axis=1)).max() < FLOAT32
     expected = K / (1 / np.maximum(t.reshape(n, K).astype(float), 1e-6)).sum(axis=1)
     assert reach == pytest.approx(expected, rel=1e-5)
-    gather_kernels.summed(np.full((K, 1), 0.25, np.float32), t[:K], K, H[:1, :1].copy(), deviation[:1], reach[:1])
+    gather_kernels.summed(np.full((K, 3), 0.25, np.float32), t[:K], K, H[:1, :3].copy(), deviation[:1], reach[:1])
     assert deviation[0] == 0
 
 
