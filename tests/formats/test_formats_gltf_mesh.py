@@ -176,6 +176,13 @@ def test_nodes_place_mirror_and_repeat(read):
         read(tetra(nodes=nodes), "x")
 
 
+def test_copies_are_of_one_shape_to_six_digits(read):
+    """What products of placements round makes no other shape; a tenth of a millimetre in a metre does."""
+    nodes = [{"mesh": 0, "scale": [1, 1, z]} for z in (1.0, 1 + 2e-8, 1.0001)]
+    plain, rounded, other = (p.shape for p in read(tetra(nodes=nodes, scenes=[{"nodes": [0, 1, 2]}])).patches)
+    assert plain == rounded != other
+
+
 def test_normals_and_texture_coordinates_follow(read):
     """Mirrored in x, scaled in z; T runs from the picture's lower left, v of the file from its upper left."""
     V = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]], dtype="f4")

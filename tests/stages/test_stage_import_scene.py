@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lib.formats import preflight, scene
+from lib.formats import preflight, scene, scene_import
 from stages import import_scene
 
 DATA = Path(__file__).parents[1] / "data"
@@ -112,3 +112,9 @@ def test_texture_coordinates_that_do_not_serve_as_a_map_are_told(home, capsys):
     (told,) = [line for line in capsys.readouterr().err.splitlines() if "uv: own" in line]
     assert told.startswith("warning: sheets.obj: `uv: own`: no texture coordinates, or they fold, ")
     assert told.endswith("charts are made for sheets.1/2, sheets.2/2")
+
+
+@pytest.mark.parametrize("side, cell", [(100.0, 1.0), (32.0, 0.5)])
+def test_the_finest_cells_of_a_mesh_are_of_the_scene_or_of_itself(side, cell):
+    """In a scene of 640 m: 1 m, but at least 64 across the mesh."""
+    assert scene_import.finest_cell(side**2, 640.0) == pytest.approx(cell)

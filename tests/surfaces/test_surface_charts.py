@@ -1,12 +1,24 @@
 """Charts: no overlap, room between them, true shapes, the same bytes each time; and a mesh's own coordinates."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import xatlas
 from scipy.ndimage import distance_transform_edt
 
-from lib.surfaces.charts import LEAST_LEVEL, MOST_LEVEL, PADDING, _next_density, charted, overlap, own_charts, stretch
+from lib.surfaces.charts import (
+    LEAST_LEVEL,
+    MOST_LEVEL,
+    PADDING,
+    _cut,
+    _next_density,
+    charted,
+    overlap,
+    own_charts,
+    stretch,
+)
 from lib.surfaces.mesh_build import mesh, normals_areas
 
 FINE = 8  # points per cell at which gaps are measured
@@ -196,3 +208,41 @@ def test_a_size_that_does_not_fit_is_met_along_the_line_of_those_tried():
     assert _next_density(tried(0.088), 128) is None  # full enough
     flat = [(0.1, 3000.0, None), (0.09, 2950.0, None)]  # the line would end below nothing
     assert _next_density(flat, 2**MOST_LEVEL) == 0.25 * 0.09
+
+
+class LaidOut:
+    """An xatlas.Atlas that lays a mesh out as one chart, as it is seen along z but for one corner."""
+
+    width = height = 1
+
+    def __init__(self, drawn):
+        self.drawn = drawn
+
+    def add_mesh(self, V, F):
+        self.F, self.uv = F, V[:, :2].copy()
+        self.uv[V.sum(axis=1).argmax(), 0] += self.drawn - 1
+
+    def generate(self, cutting, packing):
+        pass
+
+    def get_mesh(self, k):
+        return np.arange(len(self.uv)), self.F, self.uv
+
+    def get_mesh_chart_count(self, k):
+        return 1
+
+    def get_mesh_chart(self, mesh, k):
+        return SimpleNamespace(faces=np.arange(len(self.F)), type=xatlas.ChartType.LSCM)
+
+
+@pytest.mark.parametrize("drawn, n_charts", [(5.0, 1), (20.0, 2)])
+def test_a_triangle_that_the_library_draws_out_gets_a_chart_of_its_own(monkeypatch, drawn, n_charts):
+    """A strip of two hundred, whose last corner is laid so far out that one triangle is `drawn` long."""
+    n = 100
+    x = np.arange(n + 1.0)
+    V = np.concatenate([np.stack([x, np.full(n + 1, y), np.zeros(n + 1)], axis=1) for y in (0.0, 1.0)])
+    k = np.arange(n)
+    F = np.concatenate([np.stack([k, k + 1, k + n + 1], axis=1), np.stack([k + 1, k + n + 2, k + n + 1], axis=1)])
+    monkeypatch.setattr(xatlas, "Atlas", lambda: LaidOut(drawn))
+    _, chart = _cut(mesh(V, F)[0], 1.0)
+    assert chart.max() + 1 == n_charts and (np.bincount(chart)[1:] == 1).all()
