@@ -52,9 +52,9 @@ def points_at(world, seed, wanted, level_of):
     return Points(*(np.concatenate(field) for field in zip(*parts, strict=True)))
 
 
-def direct_at(world, points, shadow_rays):
-    """Direct light at points: DirectLight, and which are hidden (only those that no light reaches can be)."""
-    light = direct_light(
+def light_at(world, points, shadow_rays):
+    """DirectLight at points."""
+    return direct_light(
         points.x,
         points.N,
         points.shift,
@@ -64,6 +64,11 @@ def direct_at(world, points, shadow_rays):
         world.mesh.face_surface,
         *shadow_rays,
     )
+
+
+def direct_at(world, points, shadow_rays):
+    """DirectLight at points, and which are hidden (only those that no light reaches can be)."""
+    light = light_at(world, points, shadow_rays)
     hidden = np.zeros(len(points.x), dtype=bool)
     dark = np.flatnonzero(light.H.max(axis=(1, 2), initial=0.0) <= 0)
     if dark.size:
@@ -119,7 +124,7 @@ def elements_of(world, surfaces, seed, grids, R, base):
     asked = [draft for draft in drafts if draft.own.any()]
     if asked:  # all in one batch: a small surface asks for a few
         points = Points(*(_joined(field) for field in zip(*(draft.points for draft in asked), strict=True)))
-        H = direct_at(world, points, FEW_RAYS)[0].H.reshape(len(points.x), -1)
+        H = light_at(world, points, FEW_RAYS).H.reshape(len(points.x), -1)
         for draft, part in zip(asked, np.split(H, np.cumsum([draft.own.sum() for draft in asked])[:-1]), strict=True):
             draft.light[draft.own] = part
     return [Elements(d.rows, d.is_alone, d.area, by_element(d.light) * ~d.rows.is_hidden[..., None]) for d in drafts]
