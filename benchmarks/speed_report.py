@@ -212,7 +212,7 @@ def _ratios(rows, scenes):
         if near:
             r = min(near, key=lambda r: max(r["rmse"] / at, at / r["rmse"]))
             cells = [f"{100 * r['rmse']:.2f}", f"{r['cpu']:.1f}", *_against(rows, r)]
-        cpu = score.cpu_at(mine, at)
+        cpu = _reached(mine, at)
         ratio, here = (f"{factor * elsewhere / cpu:.1f}" if cpu else "not reached" for factor in (1, slower(rows)))
         found = [float(text.strip("> ")) for text in (cells[3], here) if text.strip("> ").replace(".", "").isdigit()]
         met = bool(found) and min(found) >= asked
