@@ -128,7 +128,28 @@ rule all:
         f"{OUT}/scene.glb",
         f"{OUT}/lods.json",
         [f"{OUT}/scene_LOD{k}.gltf" for k in LEVELS],
+        [f"{OUT}/first_look.png"] if scene.settings["bake"]["first_look"] else [],
         LOST_MAPS[:1],  # one job makes all; Snakemake takes seconds to look up thousands
+
+
+if scene.settings["bake"]["first_look"]:
+
+    rule first_look:
+        input:
+            geometry=watched(scene.geometry_files),
+        output:
+            f"{OUT}/first_look.png",
+        log:
+            **records("first_look"),
+        threads: MOST_CORES
+        params:
+            *code("first_look"),
+            slice=scene.slices["geometry"],
+            settings=SETTINGS["first_look"],
+            materials=scene.slices["materials"],
+        shell:
+            "{RUN} first_look --scene-slice {params.slice:q} --materials {params.materials:q}"
+            " --settings {params.settings:q} --out {output:q}" + TOLD
 
 
 rule import_scene:
@@ -394,5 +415,5 @@ rule report:
         " --out-html {output.html:q} --out-json {output.json:q}" + TOLD
 
 
-for each in workflow.rules:  # levels of detail wait for nothing but the geometry: what others wait for goes first
-    each.priority = int(each.name != "lod_export")
+for each in workflow.rules:  # levels of detail wait for nothing but the geometry: what others wait for goes before
+    each.priority = {"first_look": 2, "lod_export": 0}.get(each.name, 1)

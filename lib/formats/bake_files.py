@@ -87,9 +87,9 @@ def load(files):
 
 def _is_current(path, n_chunks, n_levels, has_meshes):
     """Is a cost file of a job that this bake has? Fewer chunks or levels, or no meshes, leave those of an earlier one
-    behind, and a report's own is that of the report before."""
+    behind, a report's own is that of the report before, and a first look is no part of the bake."""
     stage = Path(path).parent.name
-    if stage == "report" or (stage == "thin_meshes" and not has_meshes):
+    if stage in ("report", "first_look") or (stage == "thin_meshes" and not has_meshes):
         return False
     numbered = re.fullmatch(r"cost_(?:direct_|indirect_)?(\d+)", Path(path).stem)
     if numbered is None:

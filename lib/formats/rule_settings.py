@@ -41,6 +41,14 @@ def rule_settings(settings, warnings=(), tolerances=None, reconstruction=None, m
     refine = {name: q[name] for name in finer}
     sample = {name: q[name] for name in ("n_elements", "rays_per_element", "base_direct", "first_shadow_rays")}
     slices = {
+        "first_look": {
+            "camera": settings["camera"],
+            "units": "m",
+            "up": settings["up"],
+            "exposure": settings["export"]["exposure"],
+            "bounces": bake["bounces"],
+            "seed": bake["seed"],
+        },
         "tessellate": {"sag": bake["sag"]},
         "sample": light | sample,
         "shoot": {"n_elements": q["n_elements"], "convergence": bake["convergence"], "bounces": bake["bounces"]},

@@ -74,15 +74,16 @@ def read(folder, overrides=None):
 
 
 def without_quality(tree):
-    """Plain dict of one source's checked settings with bake.quality replaced by the tolerance it stands for.
+    """Plain dict of one source's checked settings with bake.quality replaced by what it stands for.
 
     >>> without_quality({"bake": {"quality": "final"}})
-    {'bake': {'tolerance': 0.0035}}
+    {'bake': {'tolerance': 0.0035, 'first_look': False}}
     """
     tree = _plain(tree)
     quality = (tree.get("bake") or {}).pop("quality", None)
     if quality is not None:
         tree["bake"].setdefault("tolerance", QUALITIES[quality])
+        tree["bake"].setdefault("first_look", quality == "preview")
     return tree
 
 

@@ -68,11 +68,12 @@ def _glow_row(row, pictures):
     return {"glow": {**own, "digest": pictures[own["file"]]}}
 
 
-def read(piece, folder, file, cache=None, pictures_folder=None):
+def read(piece, folder, file, cache=None, pictures_folder=None, charts=True):
     """Read the geometry a slice names and return its Scene.
 
     folder : of the scene;  file : scene.yaml as messages name it
     pictures_folder : where pictures embedded in geometry files are
+    charts : make those of meshes; a Scene without is for looking at, can not be saved, and does not shine unevenly
 
     Raises Refusal for bad input, and if a geometry file is no longer the one the slice was made from.
     """
@@ -89,6 +90,8 @@ def read(piece, folder, file, cache=None, pictures_folder=None):
         if row["front"] is not None:
             one = front[row["front"]]
             placed.append(replace(one, name=name, flip=not one.flip, front=one.name))
+    if not charts:
+        return assemble(placed, notes, piece["surfaces"], piece["up"])
     placed, refused = with_charts(placed, piece["geometry"])
     made = assemble(placed, [*notes, *refused], piece["surfaces"], piece["up"])
     return replace(made, glow=glow(made, piece["surfaces"], folder, pictures_folder, file))

@@ -9,20 +9,22 @@ from lib.surfaces.trimmed import TrimmedSurface
 
 ROUGH, LEAST = 0.02, 4  # of the size; points of a loop
 ROUNDS = 2  # of dividing the triangles of a curved trimmed surface
-LINES = np.linspace(0.0, 1.0, 9)
+LINES = 9
 
 
-def coarse(surface):
-    """V (n, 3), F (m, 3) int64: of a mesh its own, else cut at LINES of the map; normals along S_u x S_v."""
+def coarse(surface, lines=LINES):
+    """V (n, 3), F (m, 3) int64: of a mesh its own, else cut at LINES of the map, at `lines` if it is curved and has
+    no trims; normals along S_u x S_v.
+    """
     if isinstance(surface, Mesh):
         return surface.V, surface.F.astype(np.int64)
     if isinstance(surface, TrimmedSurface):
         return _trimmed(surface)
-    n = len(LINES)
-    corner = np.arange(n * n).reshape(n, n)
+    n = lines if lines == LINES or not is_planar(surface) else LINES
+    corner, t = np.arange(n * n).reshape(n, n), np.linspace(0.0, 1.0, n)
     a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
     F = np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3)
-    return evaluate_grid(surface, LINES, LINES)[0].reshape(-1, 3), F
+    return evaluate_grid(surface, t, t)[0].reshape(-1, 3), F
 
 
 def _trimmed(trim):

@@ -40,6 +40,7 @@ def test_costs_of_jobs_that_the_bake_no_longer_has_are_left_out(tmp_path):
         "stages/thin_meshes/cost.json",
         "stages/shoot/cost.json",
         "stages/report/cost.json",
+        "stages/first_look/cost.json",
     ]
     kept = [name for name in names if bake_files._is_current(tmp_path / name, n_chunks=1, n_levels=2, has_meshes=False)]
     assert kept == ["stages/sample/cost_0.json", "stages/lod_export/cost_1.json", "stages/shoot/cost.json"]

@@ -17,7 +17,16 @@ def bake_settings(folder, bake="", overrides=None):
 def test_a_name_for_a_tolerance(tmp_path, quality, tolerance):
     found = bake_settings(tmp_path, f"bake: {{quality: {quality}}}")
     assert found["tolerance"] == tolerance and "quality" not in found
-    assert found == bake_settings(tmp_path, f"bake: {{tolerance: {tolerance}}}")
+    same = bake_settings(tmp_path, f"bake: {{tolerance: {tolerance}, first_look: {str(quality == 'preview').lower()}}}")
+    assert found == same
+
+
+def test_a_preview_has_a_first_look(tmp_path):
+    """Unless it is said otherwise, and no longer where another quality is typed over it."""
+    assert bake_settings(tmp_path, "bake: {quality: preview}")["first_look"] is True
+    assert bake_settings(tmp_path, "bake: {quality: preview}", {"bake.quality": "final"})["first_look"] is False
+    assert bake_settings(tmp_path, "bake: {quality: preview, first_look: false}")["first_look"] is False
+    assert bake_settings(tmp_path, "bake: {tolerance: 0.02}")["first_look"] is False
 
 
 def test_a_tolerance_beside_it_wins(tmp_path):

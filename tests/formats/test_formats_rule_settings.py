@@ -30,17 +30,17 @@ def settings(**changed):
     [
         ({"lods": [0.5]}, set()),  # each level has a param of its own
         ({"budget": "2 MiB"}, {"budget_reduce"}),
-        ({"export__exposure": 2}, {"package"}),
+        ({"export__exposure": 2}, {"package", "first_look"}),
         ({"export__budget_order": "loss_per_byte"}, {"budget_reduce"}),
-        ({"camera": {"eye": [0, 0, 1], "target": [1, 1, 1]}}, set()),
-        ({"up": "y"}, set()),  # of the geometry, which has its own slice
+        ({"camera": {"eye": [0, 0, 1], "target": [1, 1, 1]}}, {"first_look"}),
+        ({"up": "y"}, {"first_look"}),  # of the geometry, which has its own slice
         ({"bake__chunks": 3}, set()),  # a param of its own
         ({"bake__tolerance": 0.012}, {"refine", "balance_resample"}),
         ({"bake__tolerance": 0.003}, {"refine", "balance_resample"}),
         ({"bake__relative_to": "surface"}, {"refine", "balance_resample"}),
         ({"bake__max_level": 4}, {"refine"}),
-        ({"bake__bounces": 1}, {"sample", "shoot", "refine"}),
-        ({"bake__seed": 2}, {"sample", "refine"}),
+        ({"bake__bounces": 1}, {"sample", "shoot", "refine", "first_look"}),
+        ({"bake__seed": 2}, {"sample", "refine", "first_look"}),
         ({"bake__convergence": 0.01}, {"shoot"}),
         ({"bake__sag": 0.01}, {"tessellate"}),
         ({"bake__elements": 100}, {"sample", "shoot"}),

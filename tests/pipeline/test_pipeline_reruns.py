@@ -137,3 +137,19 @@ def test_reading_the_scene_is_among_the_costs(baked):
     assert record["stage"] == "preflight" and record["cpu_seconds"] > 0 and record["rays"] == 0
     rows = json.loads((baked.results / "report.json").read_text())["stages"]
     assert rows[0]["stage"] == "preflight" and rows[0]["jobs"] == 1
+
+
+LOOK = "bake={first_look: true}"
+
+
+def test_a_first_look_comes_first_and_hangs_on_scene_and_camera_alone(fresh):
+    done = fresh.bake(config=[LOOK])
+    made = fresh.results / "first_look.png"
+    assert f"first look: {made.relative_to(fresh.work)}" in done.stdout
+    assert made.stat().st_mtime_ns < (fresh.results / "stages/import_scene/scene.npz").stat().st_mtime_ns
+    light = pictures.read_linear(str(made), "srgb")
+    assert light.shape == (400, 640, 3) and light.max() > 0.9
+    assert fresh.listed() == {"report": 1}  # which shows all settings; the picture stays
+    assert fresh.listed(config=[LOOK, "lods=[0.5]", "budget=6 KiB"]).keys() == {"budget_reduce", *EXPORT}
+    with edited(fresh.scene / "scene.yaml", "eye: [2, -4, 2]", "eye: [2, -4, 1]"):
+        assert fresh.listed(config=[LOOK]).keys() == {"first_look", "report"}
