@@ -1,16 +1,19 @@
 """How long a first look at each default scene takes: python benchmarks/first_looks.py --help.
 
 Bakes the scenes of data/scenes with `quality: preview` from an empty folder, and once more with nothing kept but the
-readings of its models.  With --against another checkout the two take turns, so that their ratio is that of one machine
-at one time.  Writes first_looks.md into benchmarks/results.
+readings of its models; notes when the picture it begins with is there, and when all is.  With --against another
+checkout the two take turns, so that their ratio is that of one machine at one time.  Writes first_looks.md into
+benchmarks/results.
 """
 
 import argparse
 import shutil
 import sys
 import tempfile
+import time
 from pathlib import Path
 from statistics import median
+from typing import NamedTuple
 
 HERE = Path(__file__).resolve().parent
 sys.path[:0] = [str(HERE), str(HERE.parent)]
@@ -22,16 +25,26 @@ from run import machine  # noqa: E402
 SCENES = ("cornell", "jussi_car", "monet_room", "fruit_room", "conference")  # cad_part needs the extra `step`
 
 
+class Look(NamedTuple):
+    """Seconds of one preview: until first_look.png was there (None where a checkout draws none), in all, and of CPU."""
+
+    picture: float | None
+    wall: float
+    cpu: float
+
+
 def look(root, scene, work, cores):
-    """Spent of one first look at a scene by the checkout `root`, in the working folder `work` as it is."""
+    """The Look of one preview of a scene by the checkout `root`, in the working folder `work` as it is."""
     command = [str(word) for word in snakemake(work, cores)]
     command[command.index("--snakefile") + 1] = str(root / "Snakefile")
     chosen = [f"scene={HERE.parent / 'data' / 'scenes' / scene}", "bake={quality: preview}"]
-    return measure.run([*command, "--quiet", "all", "--config", *chosen], log=work / "log.txt")
+    begin, drawn = time.time(), work / "results" / scene / "first_look.png"
+    spent = measure.run([*command, "--quiet", "all", "--config", *chosen], log=work / "log.txt")
+    return Look(drawn.stat().st_mtime - begin if drawn.exists() else None, spent.wall, spent.cpu)
 
 
 def looks(root, scene, work, cores):
-    """[Spent of a first look from nothing, Spent once its models are read]."""
+    """[the Look from nothing, the Look once its models are read]."""
     shutil.rmtree(work, ignore_errors=True)
     work.mkdir()
     cold = look(root, scene, work, cores)
@@ -43,24 +56,30 @@ def looks(root, scene, work, cores):
     return [cold, look(root, scene, work, cores)]
 
 
+def medians(found):
+    """The Look of medians of several."""
+    return Look(*(median(values) if None not in values else None for values in zip(*found, strict=True)))
+
+
 def markdown(rows, on, repeat, is_pair):
-    """The table; rows : {scene: [medians [(wall, CPU) from nothing, with its models read] of each checkout]}."""
-    head = ["scene", "wall s", "CPU s", "wall s, models read"]
-    head += ["wall s before", "CPU s before", "wall, ratio", "CPU, ratio"] if is_pair else []
+    """The table; rows : {scene: [[Look from nothing, with its models read] of each checkout]}."""
+    head = ["scene", "picture after s", "all after s", "CPU s", "picture after s, models read", "all, models read"]
+    head += ["all after s, before", "CPU s before", "all, ratio", "CPU, ratio"] if is_pair else []
     text = [
         "# First looks",
         "",
         f"Made by `python benchmarks/first_looks.py`; {on['cores']} cores of {on['processor']}, commit {on['commit']};"
-        f" medians of {repeat} runs of each, everything counted, `package` and `report` too.",
+        f" medians of {repeat} runs of each. Wall seconds from the command until `first_look.png` is there, and until"
+        " all is, report and GLB too.",
         "",
         "| " + " | ".join(head) + " |",
         "|---" * len(head) + "|",
     ]
     for scene, (now, *before) in rows.items():
-        cells = [now[0][0], now[0][1], now[1][0]]
+        cells = [*now[0], now[1].picture, now[1].wall]
         if before:
-            (wall, cpu), _ = before[0]
-            cells += [wall, cpu, wall / now[0][0], cpu / now[0][1]]
+            old = before[0][0]
+            cells += [old.wall, old.cpu, old.wall / now[0].wall, old.cpu / now[0].cpu]
         text.append(f"| {scene} | " + " | ".join(f"{cell:.1f}" for cell in cells) + " |")
     return "\n".join(text) + "\n"
 
@@ -81,13 +100,7 @@ def main(argv=None):
             spent = [
                 [looks(root, scene, Path(folder) / "work", args.cores) for root in roots] for _ in range(args.repeat)
             ]
-            rows[scene] = [
-                [
-                    tuple(median(getattr(turn[k][kind], key) for turn in spent) for key in ("wall", "cpu"))
-                    for kind in (0, 1)
-                ]
-                for k in range(len(roots))
-            ]
+            rows[scene] = [[medians([turn[k][kind] for turn in spent]) for kind in (0, 1)] for k in range(len(roots))]
             print(scene, rows[scene], flush=True)
             table = markdown(rows, machine(), args.repeat, len(roots) > 1)
             (args.out / "first_looks.md").write_text(table, encoding="utf-8")
