@@ -8,6 +8,7 @@ import subprocess
 import sys
 import threading
 import uuid
+from pathlib import Path
 
 sys.path.insert(0, workflow.basedir)
 gc.freeze()  # Snakemake is loaded and stays: to look for garbage in it, last when it ends, takes 0.2 s
@@ -103,6 +104,8 @@ def watched(files):
 
 onstart:
     warm_start.start()
+    if not scene.settings["bake"]["first_look"]:  # one of a bake before would show what is no longer there
+        Path(OUT, "first_look.png").unlink(missing_ok=True)
 
 
 def end_timers():

@@ -4,11 +4,11 @@ reads   geometry-<hash>.json    the slice of the settings for geometry, roles an
         folder.json beside it, and the geometry files in the folder it names
         materials: {"rho_avg": {surface: [r, g, b]}}
         settings: {"camera": {"eye", "target", "fov"} in the scene's units or null, "units", "up", "exposure": "auto" or
-        a number > 0, "bounces": "converge" or how many, "seed"}
+        a number > 0, "bounces": 1 for direct light alone, "seed"}
 writes  first_look.png
 
 Colours are averages of surfaces, curved ones have facets, and the light is smoothed noise: it shows where lamps, camera
-and things stand while the bake runs.  No other stage reads it.
+and things stand while the bake runs.  No other stage reads it, and its rays are none of the bake.
 """
 
 from pathlib import Path
@@ -17,8 +17,9 @@ import numpy as np
 
 from lib import door, forks
 from lib.formats import artefact, pictures, scene_import
-from lib.formats.report_pictures import scene_camera
+from lib.formats.scene_view import scene_camera
 from lib.report import first_look
+from lib.report.first_look import Side, Thing
 from lib.surfaces.coarse import coarse
 
 LINES = 33  # of a curved surface
@@ -35,7 +36,7 @@ def body(args, cost):
     at = artefact.read_json(Path(args.scene_slice).parent / "folder.json")
     home = Path(args.scene_slice).parents[1]
     piece = artefact.read_json(args.scene_slice)
-    x = scene_import.read(piece, at["folder"], at["file"], home / "cache", home / "pictures", charts=False)
+    x = scene_import.read(piece, at["folder"], at["file"], home / "cache", charts=False)
     told, rho_avg = args.settings, artefact.read_json(args.materials)["rho_avg"]
     camera, exposure = told.get("camera"), told.get("exposure", "auto")
     image = first_look.draw(
@@ -51,23 +52,16 @@ def body(args, cost):
 
 def things(x, rho_avg):
     """The things of a Scene x, a back being one with its front."""
-    fronts = np.flatnonzero(x.front < 0)
+    fronts = np.flatnonzero(x.front < 0).tolist()
     back = {int(front): s for s, front in enumerate(x.front) if front >= 0}
-    parts = forks.mapped(lambda s: coarse(x.surfaces[s], LINES), fronts)
     out = []
-    for s, (V, F) in zip(fronts.tolist(), parts, strict=True):
-        out.append(
-            first_look.Thing(
-                V=np.stack([V[:, 0], V[:, 2], -V[:, 1]], axis=1) if x.up == "z" else V,
-                F=F[:, ::-1] if x.flip[s] else F,
-                E=x.E[s],
-                back_E=x.E[back[s]] if s in back else np.zeros(3),
-                rho=np.array(rho_avg[x.names[s]]),
-                is_two_sided=s in back,
-                reflects=x.role[s] != "cast_only",
-                blocks=x.role[s] != "receive_only",
-            )
+    for s, (V, F) in zip(fronts, forks.mapped(lambda s: coarse(x.surfaces[s], LINES), fronts), strict=True):
+        front, other = (
+            None if k is None else Side(x.E[k], np.array(rho_avg[x.names[k]]), x.role[k] != "cast_only")
+            for k in (s, back.get(s))
         )
+        V = np.stack([V[:, 0], V[:, 2], -V[:, 1]], axis=1) if x.up == "z" else V
+        out.append(Thing(V, F[:, ::-1] if x.flip[s] else F, front, other, blocks=x.role[s] != "receive_only"))
     return out
 
 

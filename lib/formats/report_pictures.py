@@ -4,8 +4,8 @@ import numpy as np
 
 from lib import forks
 from lib.formats import exported, pictures
-from lib.formats.quantities import METRES
 from lib.formats.report_html import Pictures, Thumbnail
+from lib.formats.scene_view import scene_camera
 from lib.report import camera as cameras
 from lib.report import charts, picture, surfaces, thumbnails
 
@@ -51,17 +51,6 @@ def _viewer_model(inlined, place):
         "textures": {uri: data for _, named in inlined for uri, data in named.items()},
         "camera": place,
     }
-
-
-def scene_camera(given, settings):
-    """The camera of scene.yaml, in its units and up axis, as one in metres with y up."""
-    unit = METRES[settings.get("units", "m")]
-
-    def place(p):
-        x, y, z = (float(c) * unit for c in p)
-        return (x, y, z) if settings.get("up", "z") == "y" else (x, z, -y)
-
-    return cameras.Camera(place(given["eye"]), place(given["target"]), float(given.get("fov", 50)))
 
 
 def map_thumbnails(bake, facts):

@@ -2,7 +2,7 @@
 
 All three share config/scene.schema.json and each is checked against it on its own, so that a message names the source
 that holds the mistake.  Mappings merge key by key; a list or a value replaces the one below it.  bake.quality stands
-for a bake.tolerance of the same source, which wins where both are given.
+for a bake.tolerance of the same source, which wins where both are given, and decides a bake.first_look that is auto.
 """
 
 import math
@@ -69,21 +69,25 @@ def read(folder, overrides=None):
     scene_schema.check(defaults, mistakes, "config/bake.yaml", required=False)
     mistakes.stop()
     settings = merge(merge(defaults, without_quality(scene)), without_quality(typed))
+    is_preview = settings["bake"].pop("is_preview", False)
+    if settings["bake"]["first_look"] == "auto":
+        settings["bake"]["first_look"] = is_preview
     sources = ((COMMAND_LINE, typed), (file, scene), ("config/bake.yaml", defaults))
     return SceneFolder(given.resolve(), file, settings, sources)
 
 
 def without_quality(tree):
-    """Plain dict of one source's checked settings with bake.quality replaced by what it stands for.
+    """Plain dict of one source's checked settings with bake.quality replaced by the tolerance it stands for, and by
+    whether it is a preview.
 
     >>> without_quality({"bake": {"quality": "final"}})
-    {'bake': {'tolerance': 0.0035, 'first_look': False}}
+    {'bake': {'tolerance': 0.0035, 'is_preview': False}}
     """
     tree = _plain(tree)
     quality = (tree.get("bake") or {}).pop("quality", None)
     if quality is not None:
         tree["bake"].setdefault("tolerance", QUALITIES[quality])
-        tree["bake"].setdefault("first_look", quality == "preview")
+        tree["bake"]["is_preview"] = quality == "preview"
     return tree
 
 

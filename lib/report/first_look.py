@@ -26,26 +26,40 @@ BANDS = 8  # of rows, drawn by themselves
 DIRECT_RAYS = 6
 DIRECT_LEVELS, INDIRECT_LEVELS = 2, 5  # of wavelets: as many smooth out the noise
 THICKNESS = 0.02  # sine^2 of the angle under which a place leaves the plane of another that it counts for by half
-WHITE = 0.99  # of the pixels stay below it, as of a bake's texels
+LAMP_SIDE = 0.02  # of a lamp's triangles at most, in the frame
+WHITE = 0.99  # of the pixels stay below it; a bake's is that of its surfaces' area
+
+
+@dataclass(frozen=True)
+class Side:
+    """One side of a surface: exitance E (3,) [W/m^2], average reflectance rho (3,), and if its light reaches others."""
+
+    E: np.ndarray
+    rho: np.ndarray
+    reflects: bool = True
+
+
+NO_SIDE = Side(np.zeros(3), np.zeros(3), reflects=False)
 
 
 @dataclass(frozen=True)
 class Thing:
     """One surface of a scene.
 
-    V (n, 3) metres, y up; F (m, 3) int, counterclockwise seen from the lit side
-    E, back_E (3,) exitance of that side and of the other [W/m^2];  rho (3,) average reflectance
-    is_two_sided : the back is a surface too;  reflects : its light reaches others;  blocks : it casts shadows
+    V (n, 3) metres, y up; F (m, 3) int, counterclockwise seen from the front
+    front, back : its Sides; None for a back that is not seen;  blocks : it casts shadows
     """
 
     V: np.ndarray
     F: np.ndarray
-    E: np.ndarray
-    back_E: np.ndarray
-    rho: np.ndarray
-    is_two_sided: bool
-    reflects: bool
-    blocks: bool
+    front: Side
+    back: Side | None = None
+    blocks: bool = True
+
+    @property
+    def sides(self):
+        """Front and back, NO_SIDE for none."""
+        return self.front, self.back or NO_SIDE
 
 
 class Pixels(NamedTuple):
@@ -71,16 +85,18 @@ def draw(things, view=None, exposure=None, reflections=True, seed=0):
     The same for any number of processes.
     """
     w, h = SIZE
-    model = cache(lambda: _model(things))  # of each process: a fork can not use its parent's tracer
+    model = cache(lambda: _model(things))
     room = cache(lambda: _room(things, model()))
-    view = view or cameras.automatic(_model(things))
+    # Each process makes its own tracers; a fork can wait forever for threads of one that its parent has used.
+    few = 1 if view else BANDS
+    view = view or cameras.automatic(model())
 
     def band(rows):
         rng = np.random.default_rng([seed, rows[0]])
         return _seen(things, model(), room(), view, rows, reflections, rng)
 
     edges = np.linspace(0, h, BANDS + 1).astype(int).tolist()
-    bands = forks.mapped(band, list(zip(edges[:-1], edges[1:], strict=True)), few=1)
+    bands = forks.mapped(band, list(zip(edges[:-1], edges[1:], strict=True)), few=few)
     found = Pixels(*(np.concatenate(part) for part in zip(*bands, strict=True)))
     H = _smoothed(found.direct, found.seen, found, DIRECT_LEVELS)
     if reflections:
@@ -98,21 +114,21 @@ def draw(things, view=None, exposure=None, reflections=True, seed=0):
 
 
 def _model(things):
-    return picture.join([picture.Part(one.V, one.F, is_two_sided=one.is_two_sided) for one in things])
+    return picture.join([picture.Part(one.V, one.F, is_two_sided=one.back is not None) for one in things])
 
 
 def _room(things, model):
     """The Room of what casts shadows; lamps shine to the side that they emit on."""
     V = (model.mesh.V - model.mesh.centre) / model.mesh.scale
     surface, n = model.face_part, len(things)
-    E = np.array([one.E for one in things] + [one.back_E for one in things], dtype=np.float64)
+    sides = [one.sides[k] for k in (0, 1) for one in things]
     both = np.concatenate([model.mesh.F, model.mesh.F[:, ::-1]])
-    lamps = lamps_of(V, both, np.concatenate([surface, surface + n]), E)
-    rho = np.array([one.rho * one.reflects for one in things], dtype=np.float64)
+    E = np.array([side.E for side in sides], dtype=np.float64)
+    lamps = lamps_of(V, both, np.concatenate([surface, surface + n]), E, LAMP_SIDE)
+    rho = np.array([side.rho * side.reflects for side in sides], dtype=np.float64)
     blocks = np.array([one.blocks for one in things])[surface]
-    two_sided = np.array([one.is_two_sided for one in things])
     F = model.mesh.F[blocks]
-    return Room(V, F, surface[blocks], rho, two_sided, lamps, Tracer(V, F))
+    return Room(V, F, surface[blocks], rho[:n], rho[n:], lamps, Tracer(V, F))
 
 
 def _seen(things, model, room, view, rows, reflections, rng):
@@ -127,16 +143,16 @@ def _seen(things, model, room, view, rows, reflections, rng):
     is_back = np.einsum("ij,ij->i", N, D[hit]) > 0
     N[is_back] *= -1
     x = (origin[hit] + t[hit, None] * D[hit] - model.mesh.centre) / model.mesh.scale
-    E, back_E, rho = (np.array([getattr(one, name) for one in things]) for name in ("E", "back_E", "rho"))
+    side = is_back * len(things) + part
+    E, rho = (np.array([getattr(one.sides[k], name) for k in (0, 1) for one in things]) for name in ("E", "rho"))
 
     direct, indirect = room.direct(x, N, rng, DIRECT_RAYS), np.zeros((len(hit), 3))
     if reflections:
         row, column = hit // w, hit % w
         some = np.flatnonzero(((row + rows[0]) % 2 == 0) & (column % 2 == 0))
         indirect[some] = room.indirect(x[some], N[some], rng)
-    emitted = np.where(is_back[:, None], back_E[part], E[part])
     out = []
-    for values in (np.ones((len(hit), 1)), emitted, rho[part], N, x, direct, indirect):
+    for values in (np.ones((len(hit), 1)), E[side], rho[side], N, x, direct, indirect):
         whole = np.zeros((n, values.shape[1]), dtype=np.float32)
         whole[hit] = values
         out.append(whole.reshape(-1, w, values.shape[1]))

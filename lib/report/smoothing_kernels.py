@@ -15,7 +15,8 @@ def smooth(light, known, normal, place, step, thickness, out, out_known):
     5 x 5 pixels, `step` apart, by the weights BINOMIAL along both directions.
 
     A pixel counts for another by cosine^8 of the angle between their normals (h, w, 3), zero where nothing is seen, and
-    by how near its place (h, w, 3) is to the plane there, in `thickness` of the distance between them.
+    by how near its place (h, w, 3) is to the plane there: by half where the square of its distance from that is
+    `thickness` times the square of the distance between the two.
     out (h, w, 3), out_known (h, w): the means, and 1 where something was known.
     """
     h, w = known.shape

@@ -44,12 +44,12 @@ def side_light(V, F, face_surface, E, rho, candidates, seed=0):
     if not len(order) or not len(lamps.share):
         return light
 
-    is_candidate = np.zeros(len(power), dtype=bool)
-    is_candidate[candidates] = True
+    back_rho = np.zeros_like(rho)
+    back_rho[candidates] = rho[candidates]
 
     @cache
     def room():  # of each process: a tracer that a fork has from its parent can not be used
-        return Room(V, F, face_surface, rho, is_candidate, lamps, Tracer(V, F))
+        return Room(V, F, face_surface, rho, back_rho, lamps, Tracer(V, F))
 
     def means(first):
         n, rng = len(order[first : first + AT_ONCE]), np.random.default_rng([seed, first])

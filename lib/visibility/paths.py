@@ -32,12 +32,15 @@ class Lamps:
     share: np.ndarray
 
 
-def lamps_of(V, F, face_surface, E):
-    """The Lamps of triangles F (m, 3) of V (n, 3), of surfaces face_surface (m,) with exitance E (surfaces, C)."""
+def lamps_of(V, F, face_surface, E, largest=np.inf):
+    """The Lamps of triangles F (m, 3) of V (n, 3), of surfaces face_surface (m,) with exitance E (surfaces, C).
+
+    largest : side of a triangle; larger ones are divided.  Nearer than twice its side a triangle gives too little.
+    """
     power = E.max(axis=1)
     face = np.flatnonzero(power[face_surface] > 0) if len(F) else np.zeros(0, dtype=np.int64)
     face = face[by_place(V, F[face])]
-    corner, surface = V[F[face]], face_surface[face]
+    corner, surface = _divided(V[F[face]], face_surface[face], largest)
     normal, area = normals(corner)
     tint = E[surface] / power[surface, None]
     emitted = np.cumsum(power[surface] * area)
@@ -45,6 +48,21 @@ def lamps_of(V, F, face_surface, E):
     if not total > 0:
         return Lamps(corner[:0], normal[:0], area[:0], tint[:0], 1.0, emitted[:0])
     return Lamps(corner, normal, area, tint, total, emitted / total)
+
+
+def _divided(corner, surface, largest):
+    """Triangles (k, 3, 3) and their surfaces, those with a side above `largest` in four at the middles of their sides,
+    and so on."""
+    while True:
+        middle = (corner + np.roll(corner, -1, axis=1)) / 2
+        side = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1, initial=0.0)
+        is_large = side > largest
+        if not is_large.any():
+            return corner, surface
+        (a, b, c), (x, y, z) = corner[is_large].swapaxes(0, 1), middle[is_large].swapaxes(0, 1)
+        parts = [np.stack(part, axis=1) for part in ((a, x, z), (x, b, y), (z, y, c), (y, z, x))]
+        corner = np.concatenate([corner[~is_large], *parts])
+        surface = np.concatenate([surface[~is_large], *[surface[is_large]] * 4])
 
 
 def by_place(V, F):
@@ -64,15 +82,14 @@ class Room:
     """What paths travel in.
 
     V (n, 3) in the scene's frame (its box has the side 1), F (m, 3), front counterclockwise; face_surface (m,)
-    rho (surfaces, C) reflectance; is_two_sided (surfaces,) bool: their backs reflect as their fronts do, the backs of
-    all others swallow light
+    rho, back_rho (surfaces, C) reflectance of fronts and of backs, 0 where they swallow light
     """
 
     V: np.ndarray
     F: np.ndarray
     face_surface: np.ndarray
     rho: np.ndarray
-    is_two_sided: np.ndarray
+    back_rho: np.ndarray
     lamps: Lamps
     tracer: Tracer
 
@@ -97,8 +114,8 @@ class Room:
             D = cosine_direction_each(N, rng.random((len(x), 2)))
             hits = self.tracer.closest((x + OFFSET * N).astype(np.float32), D)
             surface = self.face_surface[hits.face]
-            weight = weight * self.rho[surface]
-            goes_on = (hits.face >= 0) & (~hits.is_back | self.is_two_sided[surface]) & (weight.max(axis=1) > 0)
+            weight = weight * np.where(hits.is_back[:, None], self.back_rho[surface], self.rho[surface])
+            goes_on = (hits.face >= 0) & (weight.max(axis=1) > 0)
             hits, path, weight = hits[goes_on], path[goes_on], weight[goes_on]
             corner = self.V[self.F[hits.face]]
             a, b = hits.a[:, None].astype(np.float64), hits.b[:, None].astype(np.float64)

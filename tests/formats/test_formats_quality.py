@@ -27,6 +27,8 @@ def test_a_preview_has_a_first_look(tmp_path):
     assert bake_settings(tmp_path, "bake: {quality: preview}", {"bake.quality": "final"})["first_look"] is False
     assert bake_settings(tmp_path, "bake: {quality: preview, first_look: false}")["first_look"] is False
     assert bake_settings(tmp_path, "bake: {tolerance: 0.02}")["first_look"] is False
+    assert bake_settings(tmp_path, "bake: {first_look: true}", {"bake.quality": "final"})["first_look"] is True
+    assert bake_settings(tmp_path, "bake: {first_look: true}", {"bake.first_look": "auto"})["first_look"] is False
 
 
 def test_a_tolerance_beside_it_wins(tmp_path):

@@ -40,7 +40,7 @@ def test_command_line_over_scene_over_defaults(folder):
     scene = folder(FLOOR + "bake: {tolerance: 0.05, seed: 7}\nlods: [0.5]\n")
     read = scene_folder.read(scene, {"scene": str(scene), "bake": {"tolerance": 0.02}})
     defaults = yaml.safe_load(scene_folder.DEFAULTS_FILE.read_text())
-    assert read.settings["bake"] == {**defaults["bake"], "tolerance": 0.02, "seed": 7}
+    assert read.settings["bake"] == {**defaults["bake"], "tolerance": 0.02, "seed": 7, "first_look": False}
     assert read.settings["lods"] == [0.5] and read.settings["budget"] == "64 MiB"
     assert read.where(("bake", "tolerance")) == ("command line", None)
     assert read.where(("bake", "seed")) == (str(scene / "scene.yaml"), 3)

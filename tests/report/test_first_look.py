@@ -9,12 +9,12 @@ from lib import forks
 from lib.maps.colour import srgb_to_linear
 from lib.report import first_look, picture
 from lib.report.camera import Camera
-from lib.report.first_look import Thing, draw
+from lib.report.first_look import Side, Thing, draw
 from lib.report.smoothing_kernels import smooth
 from lib.surfaces.coarse import coarse
 from tests.shapes import box, rectangle, sphere
 
-BLACK = np.zeros(3)
+DARK = Side(np.zeros(3), np.zeros(3))
 ABOVE = Camera((0.0, 3.0, 0.001), (0.0, 0.0, 0.0), 60.0)
 
 
@@ -24,15 +24,16 @@ def small(monkeypatch):
 
 
 def thing(surface, E=0.0, rho=0.0, **more):
-    """A Thing of a NURBS surface, its lit side along S_u x S_v."""
-    V, F = coarse(surface)
-    facts = {"back_E": BLACK, "is_two_sided": False, "reflects": True, "blocks": True}
-    return Thing(V, F, np.ones(3) * E, rho=np.ones(3) * rho, **(facts | more))
+    """A Thing of a NURBS surface, its front along S_u x S_v."""
+    return Thing(*coarse(surface), Side(np.ones(3) * E, np.ones(3) * rho), **more)
 
 
 def floor(rho=0.5, side=2.0):
     """In y = 0, lit above."""
     return thing(rectangle([-side / 2, 0, -side / 2], [0, 0, side], [side, 0, 0]), rho=rho)
+
+
+FLOOR = rectangle([-1, 0, -1], [0, 0, 2], [2, 0, 0])
 
 
 def lamp(y, side=0.1, E=100.0, x=0.0, **more):
@@ -74,25 +75,25 @@ def test_what_no_lamp_sees_is_black_without_reflections():
     low = Camera((0.0, 0.25, 1.2), (0.0, 0.0, 0.0), 20.0)
     assert not middle(draw(things, low, exposure=1.0, reflections=False)).any()
     assert (middle(draw(things, low, exposure=1.0)) > 0).all()
-    things[-1] = replace(ceiling, reflects=False)
+    things[-1] = replace(ceiling, front=replace(ceiling.front, reflects=False))
     assert not middle(draw(things, low, exposure=1.0)).any()
 
 
 def test_colours_of_lamp_and_floor():
-    things = [replace(floor(), rho=np.array([0.5, 0.5, 0.0])), replace(lamp(1.0), E=np.array([100.0, 50.0, 100.0]))]
+    things = [thing(FLOOR, rho=np.array([0.5, 0.5, 0.0])), lamp(1.0, E=np.array([100.0, 50.0, 100.0]))]
     red, green, blue = middle(draw(things, ABOVE, exposure=1.0, reflections=False))
     assert green == pytest.approx(red / 2, rel=0.02) and blue == 0
 
 
 def test_a_lamp_shows_its_own_light_and_the_brightest_floor_is_white():
-    image = draw([lamp(0.0, 2.0, E=3.0, back_E=np.array([1.5, 0, 0]), is_two_sided=True)], ABOVE, exposure=np.pi / 3)
+    image = draw([lamp(0.0, 2.0, E=3.0, back=Side(np.array([1.5, 0, 0]), np.zeros(3)))], ABOVE, exposure=np.pi / 3)
     assert middle(image) == pytest.approx([0.5, 0, 0], abs=0.01)
     assert middle(draw([floor(), lamp(1.0)], ABOVE, reflections=False)) == pytest.approx([1, 1, 1], rel=0.03)
 
 
 def test_a_back_shines_down():
     """What a lamp that faces upwards emits from its back lights the floor."""
-    up = replace(lamp(1.0), E=BLACK, back_E=np.full(3, 100.0), is_two_sided=True)
+    up = replace(lamp(1.0), front=DARK, back=lamp(1.0).front)
     turned = replace(up, F=up.F[:, ::-1])
     image = draw([floor(), turned], Camera((0.8, 0.8, 0.8), (0, 0, 0), 10.0), exposure=np.pi * 0.5, reflections=False)
     assert middle(image) == pytest.approx([0.25 * 100 * 0.1**2 / np.pi] * 3, rel=0.05)
@@ -102,7 +103,7 @@ def test_backs_are_seen_through_unless_they_are_surfaces():
     below = Camera((0.0, -3.0, 0.001), (0.0, 0.0, 0.0), 30.0)
     background = np.rint(255 * np.array(picture.BACKGROUND)).astype(np.uint8)
     assert (draw([floor()], below) == background).all()
-    both = draw([replace(floor(), is_two_sided=True), lamp(1.0)], below, exposure=1.0)
+    both = draw([replace(floor(), back=Side(np.zeros(3), np.ones(3))), lamp(1.0)], below, exposure=1.0)
     assert not middle(both).any()  # no light comes there
 
 
@@ -117,8 +118,35 @@ def test_roles():
 @pytest.mark.parametrize("rest", [[], ["a sphere that blocks nothing"]])
 def test_no_lamp_and_nothing_that_blocks(rest):
     """Black, and no fault."""
-    things = [replace(thing(sphere(0.5), rho=0.5), blocks=False) for _ in rest] or [floor()]
+    things = [thing(sphere(0.5), rho=0.5, blocks=False) for _ in rest] or [floor()]
     assert not middle(draw(things, ABOVE)).any()
+
+
+def test_what_only_receives_is_lit_where_nothing_blocks():
+    image = draw([replace(one, blocks=False) for one in (floor(), lamp(1.0))], replace(ABOVE, fov=6.0), exposure=1.0)
+    assert middle(image) == pytest.approx([0.5 * 100 * 0.1**2 / np.pi / np.pi] * 3, rel=0.03)
+
+
+def test_a_large_lamp_of_two_triangles_close_to_the_floor():
+    """Below the middle of a square of side 1 in a height h, by the form factor of its quarter in closed form."""
+    V, F = np.array([[-0.5, 0.4, -0.5], [0.5, 0.4, -0.5], [0.5, 0.4, 0.5], [-0.5, 0.4, 0.5]]), [[0, 1, 2], [0, 2, 3]]
+    square = Thing(V, np.array(F), Side(np.full(3, 1.0), np.zeros(3)))
+    a = 0.5 / 0.4
+    share = 4 * (2 * a / np.sqrt(1 + a * a) * np.arctan(a / np.sqrt(1 + a * a))) / (2 * np.pi)
+    low = Camera((0.0, 0.2, 0.0001), (0.0, 0.0, 0.0), 20.0)
+    image = draw([floor(1.0), square], low, exposure=np.pi / 2, reflections=False)
+    assert middle(image) == pytest.approx([share / 2] * 3, rel=0.02)
+
+
+def test_a_back_has_its_own_reflectance():
+    """A sheet over the floor's lamp, red below: red light on the floor, and none where it only casts shadows."""
+    sheet = thing(rectangle([-1, 1, -1], [0, 0, 2], [2, 0, 0]), rho=0.8, back=Side(np.zeros(3), np.array([0.8, 0, 0])))
+    up = thing(rectangle([-0.3, 0.1, -0.3], [0, 0, 0.6], [0.6, 0, 0]), E=100.0)
+    view = Camera((1.5, 0.5, 1.5), (0.7, 0.0, 0.7), 5.0)
+    red, green, blue = middle(draw([floor(), sheet, up], view, exposure=1.0))
+    assert red > 0.1 and green == blue == 0
+    turned_off = replace(sheet, back=replace(sheet.back, reflects=False))
+    assert not middle(draw([floor(), turned_off, up], view, exposure=1.0)).any()
 
 
 @pytest.mark.parametrize("view", [ABOVE, None])

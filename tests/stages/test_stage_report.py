@@ -7,7 +7,17 @@ import shutil
 import numpy as np
 import pytest
 
-from lib.formats import casters, light_maps, pictures, report_pictures, scene, solution, textured_maps, trees
+from lib.formats import (
+    casters,
+    light_maps,
+    pictures,
+    report_pictures,
+    scene,
+    scene_view,
+    solution,
+    textured_maps,
+    trees,
+)
 from lib.formats.artefact import write_json
 from lib.maps.mapset import pack
 from lib.nurbs.surface import bilinear
@@ -295,7 +305,7 @@ def test_the_page_is_whole_and_names_are_text(results):
 
 
 def test_the_camera_of_the_scene_is_turned_to_metres_and_y_up():
-    view = report_pictures.scene_camera(SETTINGS["camera"], SETTINGS)
+    view = scene_view.scene_camera(SETTINGS["camera"], SETTINGS)
     assert view.eye == pytest.approx((1, 3, -0.5)) and view.target == pytest.approx((1, 0, -0.5)) and view.fov == 40
 
 
