@@ -127,10 +127,17 @@ def frame(surface, u, v):
 
 def frame_grid(surface, u, v):
     """Points and unit normals on a grid: S (k, m, 3), N (k, m, 3), row j is v[j]."""
+    return density_grid(surface, u, v)[:2]
+
+
+def density_grid(surface, u, v):
+    """Points, unit normals and area per area of (u, v) on a grid: S (k, m, 3), N (k, m, 3), |S_u x S_v| (k, m)."""
     S, S_u, S_v = evaluate_grid(surface, u, v)
+    cross = np.cross(S_u, S_v)
+    density = np.linalg.norm(cross, axis=2)
     uu, vv = np.meshgrid(u, v)
-    N = _limit(surface, uu.ravel(), vv.ravel(), np.cross(S_u, S_v).reshape(-1, 3))
-    return S, N.reshape(S.shape)
+    N = _limit(surface, uu.ravel(), vv.ravel(), cross.reshape(-1, 3))
+    return S, N.reshape(S.shape), density
 
 
 def _limit(surface, u, v, cross):

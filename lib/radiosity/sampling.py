@@ -8,7 +8,7 @@ import numpy as np
 from lib.elements.grids import POINTS, by_element, point_parameters
 from lib.elements.lattice import OFFSET, receivers
 from lib.elements.parts import parts
-from lib.nurbs.evaluate import evaluate_grid, frame_grid
+from lib.nurbs.evaluate import density_grid
 from lib.radiosity.direct import direct_light
 from lib.radiosity.rows import Rows, element_rows, without
 from lib.radiosity.world import FINEST
@@ -201,9 +201,7 @@ def points_on(world, s, u, v):
     surface, domain, turn = world.surface(s), world.domain(s), -1.0 if world.scene.flip[s] else 1.0
     shape = len(v), len(u)
     if domain is None:
-        S, N = frame_grid(whole(surface), u, v)
-        _, S_u, S_v = evaluate_grid(whole(surface), u, v)
-        density = np.linalg.norm(np.cross(S_u, S_v), axis=2)
+        S, N, density = density_grid(whole(surface), u, v)
         return OnSurface(S, N * turn, density, np.ones(shape, dtype=bool), np.zeros(shape, dtype=np.int64))
     chart, share = domain.shares(*shape)
     is_part = chart >= 0
