@@ -19,7 +19,7 @@ import numpy as np
 ELEMENTS = 8000  # lookups then bound the error near 0.2 % in a room with a teapot; `elements` asks for more
 ROUGH = 0.01  # tolerance above which meshes get less: there the width of their cells decides, not the noise in them
 CHART_EFFORT = 0.5  # measured in a room of 330,000 triangles: 0.2 % more error for two thirds of the rays
-FEW_CELLS = 2e5  # of all meshes: of more, a first look leaves the finest out, so that it takes about as long
+FEW_CELLS = 2e5  # of all meshes: of more, a preview leaves the finest out, so that it takes about as long
 MOST_COARSER = 2  # levels: farther up, charts begin to share cells
 LOOKUPS = 1.2e-3  # of the scene's mean light: error that the elements leave in bounced light, measured
 GATHER_RAYS = 720  # at a tolerance of 1 %
