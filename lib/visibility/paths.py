@@ -51,18 +51,19 @@ def lamps_of(V, F, face_surface, E, largest=np.inf):
 
 
 def _divided(corner, surface, largest):
-    """Triangles (k, 3, 3) and their surfaces, those with a side above `largest` in four at the middles of their sides,
-    and so on."""
+    """Triangles (k, 3, 3) and their surfaces, those with a side above `largest` in two at the middle of the longest,
+    and so on: slivers stay few."""
     while True:
-        middle = (corner + np.roll(corner, -1, axis=1)) / 2
-        side = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2).max(axis=1, initial=0.0)
-        is_large = side > largest
-        if not is_large.any():
+        side = np.linalg.norm(np.roll(corner, -1, axis=1) - corner, axis=2)
+        large = np.flatnonzero(side.max(axis=1, initial=0.0) > largest)
+        if not large.size:
             return corner, surface
-        (a, b, c), (x, y, z) = corner[is_large].swapaxes(0, 1), middle[is_large].swapaxes(0, 1)
-        parts = [np.stack(part, axis=1) for part in ((a, x, z), (x, b, y), (z, y, c), (y, z, x))]
-        corner = np.concatenate([corner[~is_large], *parts])
-        surface = np.concatenate([surface[~is_large], *[surface[is_large]] * 4])
+        first = side[large].argmax(axis=1)
+        a, b, c = (corner[large, (first + k) % 3] for k in range(3))
+        middle = (a + b) / 2
+        halves = [np.stack(half, axis=1) for half in ((a, middle, c), (middle, b, c))]
+        kept = np.delete(np.arange(len(corner)), large)
+        corner, surface = np.concatenate([corner[kept], *halves]), surface[np.concatenate([kept, large, large])]
 
 
 def by_place(V, F):
