@@ -8,7 +8,8 @@ from functools import cache
 import numpy as np
 
 from lib import forks
-from lib.visibility.paths import Room, by_place, lamps_of, normals
+from lib.nurbs.facets import normals
+from lib.visibility.paths import Room, by_place, lamps_of
 from lib.visibility.tracer import Tracer
 
 PLACES = 256  # of a side: light that enters a crack along the border reaches too few to count
@@ -85,7 +86,7 @@ def _sheets(V, F, face_surface, candidates):
     candidate's to 1: candidate i owns (i, i + 1].
     """
     face = np.flatnonzero(np.isin(face_surface, candidates))
-    area = normals(V[F[face]])[1]
+    area = normals(*V[F[face]].swapaxes(0, 1))[1]
     face, area = face[area > 0], area[area > 0]
     surface, first, row = np.unique(face_surface[face], return_index=True, return_inverse=True)
     order = by_place(V, F[face[first]])
@@ -103,7 +104,7 @@ def _places(V, F, sheets, first, n, rng):
     face, share = sheets
     t = np.arange(first, first + n)[:, None] + (np.arange(PLACES) + rng.random((n, PLACES))) / PLACES
     corner = V[F[face[np.minimum(np.searchsorted(share, t.ravel()), len(face) - 1)]]]
-    return _points(corner, rng), normals(corner)[0]
+    return _points(corner, rng), normals(*corner.swapaxes(0, 1))[0]
 
 
 def _points(corner, rng):

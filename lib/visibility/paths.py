@@ -12,6 +12,7 @@ import numpy as np
 
 from lib.compiled import compiled
 from lib.elements.lattice import OFFSET
+from lib.nurbs.facets import normals
 from lib.visibility.hemisphere import cosine_direction_each
 from lib.visibility.tracer import Tracer
 
@@ -41,7 +42,7 @@ def lamps_of(V, F, face_surface, E, largest=np.inf):
     face = np.flatnonzero(power[face_surface] > 0) if len(F) else np.zeros(0, dtype=np.int64)
     face = face[by_place(V, F[face])]
     corner, surface = _divided(V[F[face]], face_surface[face], largest)
-    normal, area = normals(corner)
+    normal, area = normals(*corner.swapaxes(0, 1))
     tint = E[surface] / power[surface, None]
     emitted = np.cumsum(power[surface] * area)
     total = float(emitted[-1]) if len(emitted) else 0.0
@@ -69,13 +70,6 @@ def _divided(corner, surface, largest):
 def by_place(V, F):
     """Order of triangles by the coordinates of their corners, whatever their numbers."""
     return np.lexsort(V[F].reshape(-1, 9).T)
-
-
-def normals(corner):
-    """Unit normals (k, 3), zero without an area, and areas (k,) of triangles with corners (k, 3, 3)."""
-    cross = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    length = np.linalg.norm(cross, axis=1)
-    return cross / np.maximum(length, 1e-300)[:, None], length / 2
 
 
 @dataclass(frozen=True)
@@ -121,7 +115,7 @@ class Room:
             corner = self.V[self.F[hits.face]]
             a, b = hits.a[:, None].astype(np.float64), hits.b[:, None].astype(np.float64)
             x = corner[:, 0] + a * (corner[:, 1] - corner[:, 0]) + b * (corner[:, 2] - corner[:, 0])
-            N = normals(corner)[0] * np.where(hits.is_back, -1.0, 1.0)[:, None]
+            N = normals(*corner.swapaxes(0, 1))[0] * np.where(hits.is_back, -1.0, 1.0)[:, None]
             H[path] += weight * self.direct(x, N, rng)
         return H
 
