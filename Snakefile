@@ -77,6 +77,8 @@ LEVELS = range(len(LODS))
 MAPS = [f"{OUT}/maps/{file}.exr" for file in MAPPED]
 FILES = listing(workflow.basedir)
 LOST_MAPS = [path for path in MAPS if not os.path.exists(path)]
+# One job makes all maps. Snakemake is told of one, lost ones first: for each it would read all inputs of that job.
+MAP = (LOST_MAPS or MAPS)[:1]
 
 
 def code(stage):
@@ -132,7 +134,7 @@ rule all:
         f"{OUT}/lods.json",
         [f"{OUT}/scene_LOD{k}.gltf" for k in LEVELS],
         [f"{OUT}/first_look.png"] if scene.settings["bake"]["first_look"] else [],
-        LOST_MAPS[:1],  # one job makes all; Snakemake takes seconds to look up thousands
+        MAP,
 
 
 if scene.settings["bake"]["first_look"]:
@@ -287,7 +289,7 @@ rule apply_base_texture:
         textures=watched(scene.texture_files),
     output:
         textured=f"{STAGE}/apply_base_texture/textured.npz",
-        maps=MAPS,
+        map=MAP,
     log:
         **records("apply_base_texture"),
     params:
