@@ -231,7 +231,8 @@ rule refine_direct:
         solution=rules.shoot.output.solution,
         samples=rules.sample.output,
     output:
-        f"{STAGE}/refine/direct_{{c}}.npz",
+        trees=f"{STAGE}/refine/direct_{{c}}.npz",
+        radiosity=temp(f"{STAGE}/refine/radiosity_{{c}}.npz"),  # large, and read once
     log:
         **records("refine", "_direct_{c}"),
     params:
@@ -241,7 +242,7 @@ rule refine_direct:
     shell:
         "{RUN} refine --half direct --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
         " --samples {input.samples:q} --chunk {wildcards.c} --chunks {params.chunks} --settings {params.settings:q}"
-        " --out {output:q}" + TOLD
+        " --out {output.trees:q} --radiosity-out {output.radiosity:q}" + TOLD
 
 
 rule refine_indirect:
@@ -249,7 +250,8 @@ rule refine_indirect:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
         solution=rules.shoot.output.solution,
-        direct=expand(rules.refine_direct.output, c=CHUNKS),
+        direct=rules.refine_direct.output.trees,
+        radiosity=expand(rules.refine_direct.output.radiosity, c=CHUNKS),
     output:
         f"{STAGE}/refine/indirect_{{c}}.npz",
     log:
@@ -260,15 +262,15 @@ rule refine_indirect:
         chunks=N_CHUNKS,
     shell:
         "{RUN} refine --half indirect --scene {input.scene:q} --casters {input.casters:q} --solution {input.solution:q}"
-        " --direct {input.direct:q} --chunk {wildcards.c} --chunks {params.chunks} --settings {params.settings:q}"
-        " --out {output:q}" + TOLD
+        " --direct {input.direct:q} --radiosity {input.radiosity:q} --chunk {wildcards.c} --chunks {params.chunks}"
+        " --settings {params.settings:q} --out {output:q}" + TOLD
 
 
 rule balance_resample:
     input:
         scene=rules.import_scene.output,
         solution=rules.shoot.output.solution,
-        direct=rules.refine_direct.output,
+        direct=rules.refine_direct.output.trees,
         indirect=rules.refine_indirect.output,
     output:
         f"{STAGE}/balance_resample/chunk_{{c}}.npz",
@@ -397,7 +399,7 @@ rule report:
         scene=rules.import_scene.output,
         casters=rules.tessellate.output,
         solution=rules.shoot.output.solution,
-        direct=expand(rules.refine_direct.output, c=CHUNKS),
+        direct=expand(rules.refine_direct.output.trees, c=CHUNKS),
         indirect=expand(rules.refine_indirect.output, c=CHUNKS),
         maps=expand(rules.balance_resample.output, c=CHUNKS),
         textures=rules.budget_reduce.output.textures,

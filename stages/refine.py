@@ -1,8 +1,10 @@
-"""Refine the light of a chunk of surfaces on adaptive quadtrees: the direct half, or the indirect half, which reads
-all direct trees.
+"""Refine the light of a chunk of surfaces on adaptive quadtrees: the direct half, or the indirect half, whose rays
+read the radiosity maps of all chunks.
 
-reads   scene.npz, casters.npz, solution.npz, and chunk_<c>.npz of sample (direct) or all direct_<c>.npz (indirect)
+reads   scene.npz, casters.npz, solution.npz, and chunk_<c>.npz of sample (direct), or direct_<c>.npz and all
+        radiosity_<c>.npz (indirect)
 writes  direct_<c>.npz or indirect_<c>.npz          (lib.formats.trees)
+        radiosity_<c>.npz (direct)                  (lib.formats.radiosity_maps)
 
 settings: seed, tolerance, tolerances, relative_to, t_direct, t_indirect, base_indirect, top, gather_rays, shadow_rays,
 smallest_cell, chart_effort, chart_coarser, bounces
@@ -12,8 +14,10 @@ import numpy as np
 
 from lib import door
 from lib.formats import casters, samples, scene, solution, trees
+from lib.formats import radiosity_maps as radiosity_file
 from lib.formats.mistakes import listed
 from lib.radiosity.quality import LOOKUPS, gather_rays
+from lib.radiosity.radiosity_maps import radiosity_maps
 from lib.radiosity.refine import efforts, error_of, lookup_table, rays_of_surfaces, refine_direct, refine_indirect
 from lib.radiosity.thresholds import own_light, own_share, thresholds
 from lib.radiosity.turned import lit_behind
@@ -27,7 +31,9 @@ def arguments(parser):
         parser.add_argument(f"--{name}", required=True, metavar="FILE")
     parser.add_argument("--half", choices=("direct", "indirect"), required=True)
     parser.add_argument("--samples", metavar="FILE", help="chunk of sample (direct half)")
-    parser.add_argument("--direct", nargs="*", default=[], metavar="FILE", help="all direct trees (indirect half)")
+    parser.add_argument("--radiosity-out", metavar="FILE", help="radiosity maps of the chunk (direct half)")
+    parser.add_argument("--direct", metavar="FILE", help="direct trees of the chunk (indirect half)")
+    parser.add_argument("--radiosity", nargs="+", metavar="FILE", help="radiosity maps of all chunks (indirect half)")
     parser.add_argument("--chunk", type=int, required=True)
     parser.add_argument("--chunks", type=int, required=True)
     parser.add_argument("--settings", type=door.json_text, required=True, metavar="JSON")
@@ -39,40 +45,46 @@ def body(args, cost):
     solved, chosen = solution.load(args.solution), args.settings
     own = own_share(world.scene.names, chosen)
     tau = thresholds(solved, own, args.half, chosen)
-    effort = efforts(world, own, chosen["chart_effort"], chosen["chart_coarser"])
+    mine = world.chunk(args.chunks, args.chunk)
+    effort = efforts(world, mine, own, chosen["chart_effort"], chosen["chart_coarser"])
+    gathers = chosen["bounces"] != 1 and bool(np.any(solved.mean_H))
     if args.half == "direct":
-        x = samples.load(args.samples)
-        done, spared = refine_direct(
-            world,
-            unpacked(x, world),
-            chosen["seed"],
-            tau,
-            chosen["top"],
-            chosen["shadow_rays"],
-            chosen["smallest_cell"],
-            effort,
-        )
-        cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))
-    elif chosen["bounces"] == 1 or not np.any(solved.mean_H):
-        done = {}
-        cost.notes["no_gather"] = len(world.chunk(args.chunks, args.chunk))
+        done = direct_half(args, world, tau, effort, cost)
+    elif gathers:
+        done = indirect_half(args, world, mine, solved, own, tau, effort)
     else:
-        direct = {s: t.dense() for path in args.direct for s, t in trees.load(path, "direct")[0].items()}
-        mine = world.chunk(args.chunks, args.chunk)
-        follows = chosen["bounces"] == "converge"
-        table = lookup_table(world, direct, solved, follows)
-        rays = rays_of_surfaces(gather_rays(chosen["gather_rays"], own), own_light(solved, chosen))
-        top, base = chosen["top"], chosen["base_indirect"]
-        smallest = chosen["smallest_cell"]
-        done = refine_indirect(world, mine, table, solved, chosen["seed"], tau, top, base, rays, smallest, effort)
-        dark = [s for s in done if not direct[s][0].any() and not done[s].value.any()]
-        if turned := lit_behind(world, dark, chosen["seed"], chosen["shadow_rays"]):
-            names = listed([world.scene.names[s] for s in turned])
-            door.warn(f"no light reaches {names}, but their backs are lit: turned inside out? `flip: true` turns them")
+        done = {}
+        cost.notes["no_gather"] = len(mine)
     demand_finite({world.scene.names[s]: tree.value for s, tree in done.items()})
+    if args.half == "direct":
+        radiosity_file.save(args.radiosity_out, radiosity_maps(world, done if gathers else {}, solved))
     lookups = LOOKUPS * float(np.max(solved.mean_H)) if args.half == "indirect" else 0.0
     trees.save(args.out, args.half, {int(s): stored(t, world.n_groups, lookups) for s, t in done.items()}, cost.notes)
     cost.rays = world.tracer.rays
+
+
+def direct_half(args, world, tau, effort, cost):
+    """{surface: Quadtree} of direct light, from the base lattices of sample."""
+    base, chosen = unpacked(samples.load(args.samples), world), args.settings
+    seed, top, smallest = chosen["seed"], chosen["top"], chosen["smallest_cell"]
+    done, spared = refine_direct(world, base, seed, tau, top, chosen["shadow_rays"], smallest, effort)
+    cost.notes = dict(zip(("below_horizon", "dim", "agreed"), (int(n) for n in spared), strict=True))
+    return done
+
+
+def indirect_half(args, world, mine, solved, own, tau, effort):
+    """{surface: Quadtree} of indirect light; warns of surfaces that seem to be turned inside out."""
+    chosen = args.settings
+    seed, top, base, smallest = (chosen[key] for key in ("seed", "top", "base_indirect", "smallest_cell"))
+    direct, maps = trees.load(args.direct, "direct")[0], [radiosity_file.load(path) for path in args.radiosity]
+    table = lookup_table(world, maps, solved, chosen["bounces"] == "converge")
+    rays = rays_of_surfaces(gather_rays(chosen["gather_rays"], own), own_light(solved, chosen))
+    done = refine_indirect(world, mine, table, solved, seed, tau, top, base, rays, smallest, effort)
+    dark = [s for s in done if not direct[s].value.any() and not done[s].value.any()]
+    if turned := lit_behind(world, dark, seed, chosen["shadow_rays"]):
+        names = listed([world.scene.names[s] for s in turned])
+        door.warn(f"no light reaches {names}, but their backs are lit: turned inside out? `flip: true` turns them")
+    return done
 
 
 def unpacked(x, world):

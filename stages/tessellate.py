@@ -13,6 +13,8 @@ import numpy as np
 
 from lib import door, forks
 from lib.formats import casters, scene
+from lib.nurbs.coincident import back_to_back
+from lib.nurbs.surface import NurbsSurface
 from lib.refusal import refusal
 from lib.surfaces import tessellate
 from lib.surfaces.closed import in_closed_shell
@@ -81,10 +83,19 @@ def make(surfaces, flip, role, sag, front=None):
         is_planar=known.is_planar[of],
         is_closed=known.is_closed[of],
         is_collapsed=known.is_collapsed[of],
+        is_back_to_back=sheets(surfaces, np.asarray(flip)[own])[of],
         shell=known.shell[of],
         borders=borders,
         **packed([parts[k] if front[s] < 0 else NO_PART for s, k in enumerate(of)]),
     )
+
+
+def sheets(surfaces, flip):
+    """(n,) bool: the whole ones of the surfaces (n,) in the frame, turned where flip (n,), that stand back to back."""
+    whole = [s for s, surface in enumerate(surfaces) if isinstance(surface, NurbsSurface)]
+    out = np.zeros(len(surfaces), dtype=bool)
+    out[whole] = back_to_back([surfaces[s] for s in whole], flip[whole], 1.0)
+    return out
 
 
 def packed(parts):

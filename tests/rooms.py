@@ -148,13 +148,14 @@ class Baked:
         files += ["--samples", *(self.path("samples", c) for c in range(self.chunks))]
         return self.run(shoot, "shoot", *files, "--out", self.path("solution"))
 
-    def refine(self, half, c):
-        light = ["--samples", self.path("samples", c)]
+    def refine(self, half, c, log=()):
+        light = ["--samples", self.path("samples", c), "--radiosity-out", self.path("radiosity", c)]
         if half == "indirect":
-            light = ["--direct", *(self.path("direct", k) for k in range(self.chunks))]
+            light = ["--direct", self.path("direct", c)]
+            light += ["--radiosity", *(self.path("radiosity", k) for k in range(self.chunks))]
         files = ["--casters", self.path("casters"), "--solution", self.path("solution"), *light]
         which = ["--half", half, "--chunk", str(c), "--chunks", str(self.chunks)]
-        return self.run(refine, "refine", *files, *which, "--out", self.path(half, c))
+        return self.run(refine, "refine", *files, *which, "--out", self.path(half, c), log=log)
 
     def balance_resample(self, c):
         files = [

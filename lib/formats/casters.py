@@ -6,7 +6,7 @@ import numpy as np
 
 from lib.formats import artefact
 
-KIND, VERSION = "casters", 3
+KIND, VERSION = "casters", 4
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,7 @@ class Casters:
     face_shell (n_f,) bool   faces of closed shells, of whatever kind
     area (n,), extent (n, 2) mean length along u, v; sag (n,) largest distance from the mesh, 0 on planar surfaces
     is_planar (n,), is_closed (n, 2) in u, v; is_collapsed (n, 4) sides u=0, u=1, v=0, v=1; all bool
+    is_back_to_back (n,) bool : see lib.nurbs.coincident
     shell (n,) int32    closed shell of whole NURBS surfaces it belongs to, or -1
     borders (m, 5) int32 [surface a, side a, surface b, side b, reversed]: sides that are the same curve at the same
     speed
@@ -40,6 +41,7 @@ class Casters:
     is_planar: np.ndarray
     is_closed: np.ndarray
     is_collapsed: np.ndarray
+    is_back_to_back: np.ndarray
     shell: np.ndarray
     borders: np.ndarray
     part_start: np.ndarray
@@ -67,6 +69,7 @@ def _expected(x):
         "is_planar": ((n,), np.bool_),
         "is_closed": ((n, 2), np.bool_),
         "is_collapsed": ((n, 4), np.bool_),
+        "is_back_to_back": ((n,), np.bool_),
         "shell": ((n,), np.int32),
         "borders": ((len(x.borders), 5), np.int32),
         "part_start": ((n + 1, 2), np.int64),

@@ -64,11 +64,11 @@ def load(folder, name):
     try:
         header, arrays = artefact.read(Path(folder) / f"{name}.npz", KIND, VERSION)
         pictures = {k: arrays.pop(f"picture {n}").tobytes() for n, k in enumerate(header["pictures"])}
-        surfaces = surface_arrays.unpacked(arrays, np.full(len(header["patches"]), -1))
+        surfaces = list(surface_arrays.Surfaces(arrays, np.full(len(header["patches"]), -1)))
         rows = [{**dict(zip(FACTS, row, strict=True)), "labels": tuple(row[2])} for row in header["patches"]]
         patches = [Patch(surface=surface, **row) for surface, row in zip(surfaces, rows, strict=True)]
         return GeometryFile(patches, pictures=pictures, **header["file"])
-    except (ArtefactError, KeyError, TypeError, ValueError, IndexError, StopIteration):
+    except (ArtefactError, KeyError, TypeError, ValueError, IndexError):
         return None
 
 

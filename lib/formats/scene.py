@@ -5,6 +5,7 @@ repainted texture of equal average changes nothing here.
 """
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,7 +24,7 @@ class Scene:
 
     names : n different texts, ascending
     files : n file stems, safe in any file system, e.g. "003-teapot-12"
-    surfaces : n NurbsSurface, TrimmedSurface or Mesh with charts, world metres
+    surfaces : sequence of n NurbsSurface, TrimmedSurface or Mesh with charts, world metres
     front : (n,) int32, the surface whose back this is, with the same geometry and the other side lit; -1 otherwise
     flip : (n,) bool, the lit side is against S_u x S_v
     role : n of ROLES;  material : n texts
@@ -37,7 +38,7 @@ class Scene:
 
     names: list
     files: list
-    surfaces: list
+    surfaces: Sequence
     front: np.ndarray
     flip: np.ndarray
     role: list
@@ -113,11 +114,11 @@ def load(path):
     """Read a Scene; ArtefactError if the file is not one."""
     header, arrays = artefact.read(path, KIND, VERSION)
     try:
-        surfaces = surface_arrays.unpacked({k: arrays.pop(k) for k in surface_arrays.NAMES}, arrays["front"])
+        surfaces = surface_arrays.Surfaces({k: arrays.pop(k) for k in surface_arrays.NAMES}, arrays["front"])
         fields = ("names", "files", "role", "groups", "material", "up", "warnings")
         glow = _glow(*(arrays.pop(f"glow_{name}") for name in ("surface", "size", "box", "colour")))
         scene = Scene(surfaces=surfaces, **{field: header[field] for field in fields}, **arrays, glow=glow)
-    except (KeyError, TypeError, ValueError, IndexError, StopIteration) as error:
+    except (KeyError, TypeError, ValueError, IndexError) as error:
         raise ArtefactError(f"{path}: damaged ({error}); delete it to have it made again") from error
     check(scene, path)
     return scene

@@ -1,5 +1,7 @@
 """Surfaces of every kind as flat arrays and back, for scene.npz."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from lib.nurbs.surface import NurbsSurface
@@ -45,47 +47,77 @@ def packed(surfaces, front):
     }
 
 
-def unpacked(arrays, front):
-    """The surfaces of `packed` arrays."""
-    cut = {name: _Cut(arrays[name]) for name in NAMES}
-    nets = zip(arrays["degree"].tolist(), arrays["size"].tolist(), strict=True)
-    trim_size, mesh_size = iter(arrays["trim_size"].tolist()), iter(arrays["mesh_size"].tolist())
+class Surfaces(Sequence):
+    """The surfaces of `packed` arrays, each made when it is first asked for: most jobs handle a chunk of the scene.
 
-    def nurbs():
-        (p, q), (n_u, n_v) = next(nets)
-        knots_u, knots_v = cut["knots"].take(n_u + p + 1), cut["knots"].take(n_v + q + 1)
-        return NurbsSurface(p, q, knots_u, knots_v, cut["Pw"].take(n_u * n_v).reshape(n_u, n_v, 4))
+    Raises ValueError when the arrays do not fit the sizes they state.
+    """
 
-    def trimmed():
-        loop_start = np.concatenate([[0], np.cumsum(cut["loop_size"].take(next(trim_size)))]).astype(np.int64)
-        k = int(loop_start[-1])
-        rest = (cut[f"trim_{name}"].take(k) for name in ("S", "significance"))
-        return TrimmedSurface(nurbs(), cut["trim_box"].take(1)[0], cut["trim_uv"].take(k), loop_start, *rest)
+    def __init__(self, arrays, front):
+        kind, self._arrays, self._front = arrays["kind"], arrays, np.asarray(front).tolist()
+        if len(kind) != len(self._front) or ((kind < NURBS) | (kind > BACK)).any():
+            raise ValueError("kind: not that of each surface")
+        self._kind, self._made = kind.tolist(), {}
+        is_of = {NURBS: kind <= TRIMMED, TRIMMED: kind == TRIMMED, MESH: kind == MESH}
+        self._row = {which: np.cumsum(mask) - 1 for which, mask in is_of.items()}  # in the arrays of that kind
+        n, m, has_T, level = arrays["mesh_size"].T
+        loop = _starts(arrays["trim_size"])
+        point = _starts(arrays["loop_size"])
+        self._start = {
+            "knots": _starts((arrays["size"] + arrays["degree"] + 1).ravel()),
+            "Pw": _starts(arrays["size"].prod(axis=1)),
+            "loop_size": loop,
+            "trim_box": np.arange(len(loop)),
+            **dict.fromkeys(("trim_uv", "trim_S", "trim_significance"), point[np.minimum(loop, len(point) - 1)]),
+            "mesh_V": _starts(n),
+            **dict.fromkeys(("mesh_F", "mesh_N"), _starts(m)),
+            "mesh_T": _starts(m * has_T),
+            **dict.fromkeys(("mesh_uv", "mesh_chart"), _starts(m * (level >= 0))),
+        }
+        rows = {NURBS: arrays["degree"], TRIMMED: arrays["trim_size"], MESH: arrays["mesh_size"]}
+        if any(mask.sum() != len(rows[which]) for which, mask in is_of.items()):
+            raise ValueError("kind: other numbers of surfaces than the arrays hold")
+        if any(start[-1] != len(arrays[name]) for name, start in self._start.items()):
+            raise ValueError("arrays of other lengths than their sizes say")
 
-    def mesh():
-        n, m, has_T, level = next(mesh_size)
-        V, F, N = cut["mesh_V"].take(n), cut["mesh_F"].take(m), cut["mesh_N"].take(m)
-        T = cut["mesh_T"].take(m) if has_T else None
-        if level < 0:
-            return Mesh(V, F, N, T)
-        return Mesh(V, F, N, T, cut["mesh_uv"].take(m), cut["mesh_chart"].take(m), int(level))
+    def __len__(self):
+        return len(self._kind)
 
-    make = {NURBS: nurbs, TRIMMED: trimmed, MESH: mesh, BACK: lambda: None}
-    surfaces = [make[kind]() for kind in arrays["kind"].tolist()]
-    return [surfaces[f] if f >= 0 else s for s, f in zip(surfaces, np.asarray(front).tolist(), strict=True)]
+    def __getitem__(self, s):
+        s = range(len(self))[s]
+        if self._kind[s] == BACK:
+            return self[self._front[s]]
+        if s not in self._made:
+            make = {NURBS: self._nurbs, TRIMMED: self._trimmed, MESH: self._mesh}[self._kind[s]]
+            self._made[s] = make(s)
+        return self._made[s]
+
+    def _part(self, name, k):
+        """What belongs to row k of its kind in a packed array."""
+        return self._arrays[name][self._start[name][k] : self._start[name][k + 1]]
+
+    def _nurbs(self, s):
+        k = int(self._row[NURBS][s])
+        (p, q), (n_u, n_v) = self._arrays["degree"][k].tolist(), self._arrays["size"][k].tolist()
+        knots_u, knots_v = self._part("knots", 2 * k), self._part("knots", 2 * k + 1)
+        return NurbsSurface(p, q, knots_u, knots_v, self._part("Pw", k).reshape(n_u, n_v, 4))
+
+    def _trimmed(self, s):
+        k = int(self._row[TRIMMED][s])
+        box, uv, *rest = (self._part(f"trim_{name}", k) for name in ("box", "uv", "S", "significance"))
+        return TrimmedSurface(self._nurbs(s), box[0], uv, _starts(self._part("loop_size", k)), *rest)
+
+    def _mesh(self, s):
+        k = int(self._row[MESH][s])
+        has_T, level = self._arrays["mesh_size"][k, 2:].tolist()
+        V, F, N, T, uv, chart = (self._part(f"mesh_{name}", k) for name in ("V", "F", "N", "T", "uv", "chart"))
+        packing = (uv, chart, int(level)) if level >= 0 else ()
+        return Mesh(V, F, N, T if has_T else None, *packing)
 
 
-class _Cut:
-    """Takes a packed array apart from the front."""
-
-    def __init__(self, array):
-        self.array, self.at = array, 0
-
-    def take(self, n):
-        self.at += n
-        if self.at > len(self.array):
-            raise ValueError("arrays are shorter than their sizes say")
-        return self.array[self.at - n : self.at]
+def _starts(sizes):
+    """Where parts of these sizes (n,) begin in their packed array, and its end: (n + 1,) int64."""
+    return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
 
 def _kind(surface):

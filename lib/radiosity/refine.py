@@ -7,8 +7,7 @@ import numpy as np
 
 from lib.elements.balance import children
 from lib.elements.quadtree import SMALLEST_CELL, Quadtree
-from lib.maps.resample import resample
-from lib.radiosity.gather import LookupTable, indirect_light, radiosity_map
+from lib.radiosity.gather import LookupTable, indirect_light
 from lib.radiosity.sampling import direct_at, points_at
 
 LARGE_CELL = 1 / 8  # of the scene's largest side
@@ -110,14 +109,15 @@ def refine_direct(world, base, seed, tau, top, shadow_rays, smallest=SMALLEST_CE
     return trees, spared
 
 
-def efforts(world, own, chart_effort, chart_coarser=0):
-    """The Effort that surfaces are worth: share chart_effort on meshes, whose cells stop at those of their atlas (or
+def efforts(world, surfaces, own, chart_effort, chart_coarser=0):
+    """The Effort that `surfaces` are worth: share chart_effort on meshes, whose cells stop at those of their atlas (or
     chart_coarser levels above) however the light changes, but where a finer tolerance is asked; all elsewhere.
 
     own : (n,) of own_share
     """
-    is_mesh = np.array([world.finest(s) is not None for s in range(world.n)], dtype=bool)
-    less = is_mesh & (own >= 1)
+    meshes = [s for s in surfaces if world.finest(s) is not None]
+    less = np.zeros(world.n, dtype=bool)
+    less[meshes] = own[meshes] >= 1
     return Effort(np.where(less, chart_effort, 1.0), np.where(less, chart_coarser, 0))
 
 
@@ -195,31 +195,15 @@ def contrast_at(points, solution):
     return np.where((n_u > 0) & (contrast[element] > 0), contrast[element], contrast.mean())
 
 
-def lookup_table(world, direct, solution, follows_near=True):
-    """Radiosity maps of every surface that reflects.
+def lookup_table(world, maps, solution, follows_near=True):
+    """LookupTable of the RadiosityMaps of all chunks.
 
-    direct : {surface: (value (h, w, G, 3), known, hidden)} direct trees on their lattices
-    solution : has H_indirect (n, G, 3), is_hidden (n, 16), is_alone (n,), n_u, n_v, first, rho (surfaces, 3)
+    solution : has n_u, n_v, rho (surfaces, 3)
     follows_near : near hits are followed on, which adds a reflection: not where they are numbered
     """
-    maps = {}
-    for s in np.flatnonzero(world.reflects & (solution.n_u > 0)):
-        value, hidden = resample(*direct[s])
-        part = slice(solution.first[s], solution.first[s + 1])
-        grid = int(solution.n_u[s]), int(solution.n_v[s])
-        closed = world.lattices[s].closed
-        maps[int(s)] = radiosity_map(
-            value,
-            hidden,
-            solution.H_indirect[part],
-            solution.is_hidden[part],
-            solution.is_alone[part],
-            grid,
-            solution.rho[s],
-            closed,
-            world.casters.area[s] * follows_near,
-        )
-    return LookupTable(maps, world.mesh, world.n, world.channels)
+    elements = np.maximum(solution.n_u * solution.n_v, 1)
+    width = np.sqrt(world.casters.area / elements) * follows_near
+    return LookupTable(maps, world.mesh, np.tile(solution.rho, (1, world.n_groups)), width)
 
 
 def error_of(tree, lookups=0.0):

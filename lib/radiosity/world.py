@@ -10,7 +10,6 @@ import numpy as np
 from lib.elements.chunks import members
 from lib.elements.grids import element_grids
 from lib.elements.lattice import Lattice, roots_of
-from lib.nurbs.coincident import back_to_back
 from lib.nurbs.evaluate import frame_grid
 from lib.nurbs.surface import NurbsSurface
 from lib.radiosity.emitters import facets_of_triangles, gather_emitters, simplified
@@ -39,8 +38,8 @@ class World:
     """What sample and refine need of a scene.
 
     scene : has names, surfaces (world units), front, flip, role, E, group, groups, is_black, glow
-    casters : has centre, scale, V, F, UV, face_surface, sag, area, extent, is_planar, is_closed, is_collapsed, shell,
-        part(s)
+    casters : has centre, scale, V, F, UV, face_surface, sag, area, extent, is_planar, is_closed, is_collapsed,
+        is_back_to_back, shell, part(s)
     """
 
     def __init__(self, scene, casters):
@@ -135,7 +134,7 @@ class World:
             ]
             surfaces[s] = own if s in glow else own[0]
         found = gather_emitters(surfaces, self.scene.flip, self.scene.E, self.scene.group, glow)
-        return replace(found, is_curved=found.is_curved | self._is_back_to_back[found.surface])
+        return replace(found, is_curved=found.is_curved | self.casters.is_back_to_back[found.surface])
 
     def _lit_parts(self, s):
         """[(V, F)] of the parts of surface s, which is known by its triangles, that shine each in its own way."""
@@ -164,19 +163,11 @@ class World:
         a ray meets is a matter of rounding.
         """
         c = self.casters
-        face = self._is_back_to_back[c.face_surface]
+        face = c.is_back_to_back[c.face_surface]
         V = np.array(c.V)
         vertex, first = np.unique(c.F[face], return_index=True)
         V[vertex] += APART * self.mesh.normal[: len(face)][face][first // 3]
         return Tracer(V, c.F, self.mesh.two_sided)
-
-    @cached_property
-    def _is_back_to_back(self):
-        S, front = self.scene.surfaces, self.scene.front
-        whole = [s for s in range(self.n) if isinstance(S[s], NurbsSurface) and front[s] < 0]
-        out = np.zeros(self.n, dtype=bool)
-        out[whole] = back_to_back([self.surface(s) for s in whole], np.asarray(self.scene.flip)[whole], 1.0)
-        return out
 
     @cached_property
     def mesh(self):

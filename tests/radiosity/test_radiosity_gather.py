@@ -1,11 +1,14 @@
 """The loops of the final gather against plain numpy, on maps, meshes and hits drawn at random."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 
 from lib.elements.lattice import OFFSET
 from lib.radiosity import gather_kernels
-from lib.radiosity.gather import NEAR, LookupTable, RadiosityMap, indirect_light
+from lib.radiosity.gather import NEAR, LookupTable, indirect_light
+from lib.radiosity.radiosity_maps import RadiosityMaps, weighted
 from lib.visibility.mesh_lookup import MeshLookup
 from lib.visibility.qmc import path_steps
 from lib.visibility.tracer import Hits, Tracer
@@ -18,11 +21,32 @@ F = np.array([[0, 1, 2], [3, 2, 1], [0, 2, 4], [5, 4, 2]], dtype=np.int32)
 SURFACE = [0, 0, 1, 2]  # the last has no map
 
 
+@dataclass
+class Map:
+    value: np.ndarray
+    direct: np.ndarray
+    weight: np.ndarray
+    rho: np.ndarray
+    width: float
+
+
 def a_map(rng, h, w, width):
     shape = h, w, C
     weight = (rng.random((h, w)) > 0.3).astype(np.float32)
     value, direct = (rng.random(shape).astype(np.float32) for _ in range(2))
-    return RadiosityMap(value, direct, weight, rng.random(C).astype(np.float32), width)
+    return Map(value, direct, weight, rng.random(C).astype(np.float32), width)
+
+
+def table_of(maps, mesh, n):
+    """LookupTable of {surface: Map}, packed last one first, as files of chunks may lie."""
+    parts = []
+    for s, m in sorted(maps.items(), reverse=True):
+        texels = (weighted(x.reshape(*m.weight.shape, -1, 3), m.weight == 0) for x in (m.value, m.direct))
+        parts.append(RadiosityMaps(np.array([s], np.int32), np.array([m.weight.shape], np.int32), *texels))
+    rho, width = np.ones((n, len(m.rho))), np.ones(n)  # of surfaces without a map nothing counts
+    for s, m in maps.items():
+        rho[s], width[s] = m.rho, m.width
+    return LookupTable(parts, mesh, rho, width)
 
 
 @pytest.fixture
@@ -40,7 +64,7 @@ def scene():
         rng.random(n) < 0.2,
         rng.random(n).astype(np.float32),
     )
-    return maps, mesh, LookupTable(maps, mesh, 3, C), hits
+    return maps, mesh, table_of(maps, mesh, 3), hits
 
 
 def plain_look_up(maps, field, face, a, b):
@@ -146,7 +170,7 @@ def test_a_ceiling_of_known_light():
     faces = np.array([[0, 1, 2], [3, 2, 1]], dtype=np.int32)
     mesh = MeshLookup(corners, faces, corners[:, :2], [0, 0], np.zeros(2, dtype=bool))
     flat = np.full((2, 2, 3), 2.0, np.float32)
-    table = LookupTable({0: RadiosityMap(flat, flat, np.ones((2, 2), np.float32), np.ones(3), 0.01)}, mesh, 1, 3)
+    table = table_of({0: Map(flat, flat, np.ones((2, 2), np.float32), np.ones(3), 0.01)}, mesh, 1)
     x, N = np.full((4, 3), (0.5, 0.5, 0.0)), np.tile([0, 0, 1.0], (4, 1))
     shift = np.random.default_rng(6).random((4, 2))
     light = indirect_light(x, N, shift, 4096, Tracer(corners, faces), mesh, table, 3)

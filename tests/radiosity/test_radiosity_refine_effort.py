@@ -34,17 +34,17 @@ def refined(world, effort, tau=0.05):
 
 
 def test_only_meshes_are_worth_less_and_not_where_a_finer_tolerance_is_asked(world):
-    assert efforts(world, np.ones(3), 0.5).share.tolist() == [1, 0.5, 1]
-    assert efforts(world, np.array([1, 2.0, 2]), 0.5).share.tolist() == [1, 0.5, 1]
-    assert efforts(world, np.array([1, 0.5, 0.5]), 0.5).share.tolist() == [1, 1, 1]
-    assert efforts(world, np.ones(3), 1.0).share.tolist() == [1, 1, 1]
-    assert efforts(world, np.ones(3), 0.5, 2).coarser.tolist() == [0, 2, 0]
-    assert efforts(world, np.array([1, 0.5, 1]), 0.5, 2).coarser.tolist() == [0, 0, 0]
+    assert efforts(world, range(3), np.ones(3), 0.5).share.tolist() == [1, 0.5, 1]
+    assert efforts(world, range(3), np.array([1, 2.0, 2]), 0.5).share.tolist() == [1, 0.5, 1]
+    assert efforts(world, range(3), np.array([1, 0.5, 0.5]), 0.5).share.tolist() == [1, 1, 1]
+    assert efforts(world, range(3), np.ones(3), 1.0).share.tolist() == [1, 1, 1]
+    assert efforts(world, range(3), np.ones(3), 0.5, 2).coarser.tolist() == [0, 2, 0]
+    assert efforts(world, range(3), np.array([1, 0.5, 1]), 0.5, 2).coarser.tolist() == [0, 0, 0]
 
 
 def test_less_effort_takes_half_the_rays_on_the_mesh_and_changes_nothing_else(world):
     usual, all_rays = refined(world, None)
-    less, rays = refined(world, efforts(world, np.ones(3), 0.5))
+    less, rays = refined(world, efforts(world, range(3), np.ones(3), 0.5))
     assert rays < 0.7 * all_rays
     for field in ("value", "known", "hidden", "noise"):
         assert getattr(less[TABLE], field).tobytes() == getattr(usual[TABLE], field).tobytes(), field
@@ -70,7 +70,7 @@ def test_full_effort_is_what_no_effort_named_is(world):
 def test_a_mesh_ends_as_many_levels_above_its_atlas_and_nothing_else_does(world):
     usual, _ = refined(world, None)
     assert usual[ROOM].level == world.finest(ROOM) == 5
-    coarse, _ = refined(world, efforts(world, np.ones(3), 1.0, 1))
+    coarse, _ = refined(world, efforts(world, range(3), np.ones(3), 1.0, 1))
     assert coarse[ROOM].level == 4 and coarse[TABLE].level == usual[TABLE].level
     # Its samples are those that the finer one has there, but where these lie on the cells of other charts.
     a, b = usual[ROOM].value[::2, ::2], coarse[ROOM].value
@@ -79,4 +79,4 @@ def test_a_mesh_ends_as_many_levels_above_its_atlas_and_nothing_else_does(world)
 
 
 def test_a_level_above_the_base_is_the_coarsest_there_is(world):
-    assert refined(world, efforts(world, np.ones(3), 1.0, 9))[0][ROOM].level == 3
+    assert refined(world, efforts(world, range(3), np.ones(3), 1.0, 9))[0][ROOM].level == 3

@@ -21,7 +21,7 @@ def costs(folder, surfaces, **changes):
     def logged(stage, name, *argv, **more):
         called = f"{name} {argv[argv.index('--half') + 1]}" if "--half" in argv else name
         path = folder / f"cost {called}.json"
-        status = run(stage, name, *argv, **more, log=["--cost", str(path)])
+        status = run(stage, name, *argv, **more | {"log": ["--cost", str(path)]})
         records[called] = artefact.read_json(path)
         return status
 

@@ -48,6 +48,7 @@ def build(folder):
             is_planar=np.ones(n, bool),
             is_closed=np.zeros((n, 2), bool),
             is_collapsed=np.zeros((n, 4), bool),
+            is_back_to_back=np.zeros(n, bool),
             shell=np.full(n, -1, np.int32),
             borders=np.zeros((0, 5), np.int32),
             part_start=np.zeros((n + 1, 2), np.int64),

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from lib.elements.balance import is_balanced
-from lib.formats import artefact, samples, trees
+from lib.formats import artefact, radiosity_maps, samples, trees
 from lib.nurbs.shape import transformed
 from stages import refine
 from tests.rooms import Baked, cube, cube_mesh, scene_of
@@ -156,9 +156,8 @@ def test_without_emission_all_is_zero(tmp_path):
 def test_one_bounce_has_no_indirect_half(tmp_path):
     bake, found = refined(tmp_path, still_life(), bounces=1)
     assert found["indirect"] == {} and len(found["direct"]) == 3
-    files = ["--casters", bake.path("casters"), "--solution", bake.path("solution"), "--direct", bake.path("direct", 0)]
-    argv = ["--half", "indirect", "--chunk", "0", "--chunks", "1", "--out", bake.path("indirect", 0)]
-    assert bake.run(refine, "refine", *files, *argv, log=["--cost", str(tmp_path / "cost.json")]) == 0
+    assert not len(radiosity_maps.load(bake.path("radiosity", 0)).surface)
+    assert bake.refine("indirect", 0, log=["--cost", str(tmp_path / "cost.json")]) == 0
     assert artefact.read_json(tmp_path / "cost.json")["rays"] == 0
 
 
@@ -184,16 +183,11 @@ def test_damaged_files_are_refused_by_name(tmp_path, capsys, name):
 
 def test_the_other_half_is_refused(one, tmp_path, capsys):
     bake, _ = one
-    files = [
-        "--casters",
-        bake.path("casters"),
-        "--solution",
-        bake.path("solution"),
-        "--direct",
-        bake.path("indirect", 0),
-    ]
+    files = {"casters": "casters", "solution": "solution", "direct": "indirect_0", "radiosity": "radiosity_0"}
     argv = ["--half", "indirect", "--chunk", "0", "--chunks", "1", "--out", str(tmp_path / "x.npz")]
-    assert bake.run(refine, "refine", *files, *argv) == 1
+    for name, stem in files.items():
+        argv += [f"--{name}", bake.path(stem)]
+    assert bake.run(refine, "refine", *argv) == 1
     assert "holds indirect trees, expected direct" in capsys.readouterr().err
 
 
@@ -207,12 +201,8 @@ def test_less_effort_takes_its_share_of_shadow_rays_and_the_root_of_it_of_gather
     rays = {}
     for effort in (1.0, 0.25):
         bake.settings["refine"] |= same_samples | {"chart_effort": effort, "chart_coarser": 0}
-        for half, light in (("direct", ["--samples", "samples_0"]), ("indirect", ["--direct", "direct_0"])):
-            files = [light[0], bake.path(light[1])]
-            for name in ("casters", "solution"):
-                files += [f"--{name}", bake.path(name)]
-            files += ["--half", half, "--chunk", "0", "--chunks", "1", "--out", bake.path(half, 0)]
-            assert bake.run(refine, "refine", *files, log=["--cost", str(tmp_path / "cost.json")]) == 0
+        for half in ("direct", "indirect"):
+            assert bake.refine(half, 0, log=["--cost", str(tmp_path / "cost.json")]) == 0
             rays[half, effort] = artefact.read_json(tmp_path / "cost.json")["rays"]
     assert rays["direct", 0.25] < 0.7 * rays["direct", 1.0]  # the rest asks whether dark samples are buried
     assert 0.45 < rays["indirect", 0.25] / rays["indirect", 1.0] < 0.6

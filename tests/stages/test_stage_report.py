@@ -82,6 +82,7 @@ def make(folder):
             np.ones(3, bool),
             no((3, 2), bool),
             no((3, 4), bool),
+            no(3, bool),
             np.full(3, -1, np.int32),
             np.array([[0, 1, 1, 0, 0]], np.int32),
             no((4, 2), np.int64),

@@ -65,8 +65,12 @@ def run(folder, home, intensity=None):
     door(sample, "sample", *both, *chunk, "--out", file("samples"))
     materials = ["--materials", found.slices["materials"]]
     door(shoot, "shoot", *both, "--samples", file("samples"), *materials, "--out", file("solution"))
-    for half, light in (("direct", "samples"), ("indirect", "direct")):
-        given = ["--half", half, f"--{light}", file(light), "--solution", file("solution"), "--out", file(half)]
+    light = {
+        "direct": ["--samples", file("samples"), "--radiosity-out", file("radiosity")],
+        "indirect": ["--direct", file("direct"), "--radiosity", file("radiosity")],
+    }
+    for half, files in light.items():
+        given = ["--half", half, *files, "--solution", file("solution"), "--out", file(half)]
         door(refine, "refine", *both, *chunk, *given)
     halves = ["--direct", file("direct"), "--indirect", file("indirect"), "--solution", file("solution")]
     door(balance_resample, "balance_resample", "--scene", file("scene"), *halves, "--out", file("maps"))
