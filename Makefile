@@ -107,7 +107,9 @@ setup:  ## only create .venv from requirements.lock and check the system's libra
 	    say "make: $$(tail -n 1 .venv/import.log)"
 	    say "open3d needs libraries that this system lacks. Type"; command_to_type $(SYSTEM_PACKAGES); exit 1
 	fi
-	say "Compiling the inner loops for this machine, once."
+	say "Compiling Python and the inner loops for this machine, once."
+	# Where PYTHONDONTWRITEBYTECODE is set, as in many containers, every bake would do it again: 2 CPU s each.
+	.venv/bin/python -m compileall -qq -j 0 .venv/lib lib stages || :  # some packages hold templates of Python
 	.venv/bin/python -c 'from lib.compiled import compile_all; compile_all()' || say "make: that failed; the first bake will do it."
 	touch .venv/system.stamp
 
