@@ -141,7 +141,7 @@ if scene.settings["bake"]["first_look"]:
 
     rule first_look:
         input:
-            geometry=watched(scene.geometry_files),
+            files=watched(scene.geometry_files + scene.texture_files + scene.emission_files),
         output:
             f"{OUT}/first_look.png",
         log:
@@ -152,9 +152,10 @@ if scene.settings["bake"]["first_look"]:
             slice=scene.slices["geometry"],
             settings=SETTINGS["first_look"],
             materials=scene.slices["materials"],
+            textures=scene.slices["textures"],
         shell:
             "{RUN} first_look --scene-slice {params.slice:q} --materials {params.materials:q}"
-            " --settings {params.settings:q} --out {output:q}" + TOLD
+            " --textures {params.textures:q} --settings {params.settings:q} --out {output:q}" + TOLD
 
 
 rule import_scene:

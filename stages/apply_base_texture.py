@@ -1,11 +1,9 @@
 """Sum the light groups, B = rho_avg H, multiply the light of textured surfaces by their base texture over rho_avg, and
 add the emission of surfaces that shine by a picture.
 
-reads   scene.npz, light maps of every chunk, materials and textures JSON    (lib.formats.scene, .light_maps; pictures)
+reads   scene.npz, light maps of every chunk, materials and textures JSON    (lib.formats.scene, .light_maps,
+        .texture_rows; pictures)
         materials: {"rho_avg": {surface: [r, g, b]}}
-        textures:  {"textures": {surface: {"file": path, "colour_space": "srgb", "repeat": [n, m]}}, "emission": the
-                   same with "factor": [r, g, b] W/m2 where the picture is white}, paths relative to the scene's folder,
-                   which folder.json beside it names
         settings:  {"texture_level": 10, "intensity": {group: factor or [r, g, b]}}
 writes  textured maps of all surfaces                                         (lib.formats.textured_maps)
         MAPS_FOLDER/<surface>.exr for each surface with a light map: B without base texture and emission, full size
@@ -18,7 +16,7 @@ import numpy as np
 
 from lib import door
 from lib.elements.lattice import roots_of
-from lib.formats import light_maps, pictures, scene, textured_maps
+from lib.formats import light_maps, pictures, scene, texture_rows, textured_maps
 from lib.formats.artefact import read_json
 from lib.maps import base_texture
 from lib.maps import emission as shine
@@ -42,8 +40,7 @@ def body(args, cost):
     x = scene.load(args.scene)
     chunk = light_maps.merge([light_maps.load(path) for path in args.maps])
     rho_avg = read_json(args.materials)["rho_avg"]
-    rows, folder_file = read_json(args.textures), Path(args.textures).parent / "folder.json"
-    textures, emission = (located(rows.get(kind, {}), folder_file) for kind in ("textures", "emission"))
+    textures, emission = texture_rows.read(args.textures)
     texture_level = checked_level(args.settings.get("texture_level", 10))
     weights = group_weights(x.groups, args.settings.get("intensity", {}), chunk.maps.value.shape[1])
 
@@ -107,17 +104,6 @@ def layers(name, textures, emission):
         yield textures[name], "texture", 1.0
     if name in emission:
         yield emission[name], "emission_texture", pictures.ANY
-
-
-def located(textures, folder_file):
-    """The textures with their paths below the folder of the scene, wherever that has been moved."""
-    if all(Path(row["file"]).is_absolute() for row in textures.values()):
-        return textures
-    folder = Path(read_json(folder_file)["folder"])
-    return {
-        name: row if row.get("embedded") else {**row, "file": str(folder / row["file"])}
-        for name, row in textures.items()
-    }
 
 
 def checked_level(level):

@@ -2,24 +2,28 @@
 
 reads   geometry-<hash>.json    the slice of the settings for geometry, roles and light     (lib.formats.scene_import)
         folder.json beside it, and the geometry files in the folder it names
-        materials: {"rho_avg": {surface: [r, g, b]}}
+        materials: {"rho_avg": {surface: [r, g, b]}};  textures: see lib.formats.texture_rows; and their pictures
         settings: {"camera": {"eye", "target", "fov"} in the scene's units or null, "units", "up", "exposure": "auto" or
         a number > 0, "bounces": 1 for direct light alone, "seed"}
 writes  first_look.png
 
-Colours are averages of surfaces, curved ones have facets, and the light is smoothed noise: it shows where lamps, camera
-and things stand while the bake runs.  No other stage reads it, and its rays are none of the bake.
+Curved surfaces have facets, and the light is smoothed noise: it shows where lamps, camera and things stand while the
+bake runs.  No other stage reads it, and its rays are none of the bake.
 """
 
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 
 from lib import door, forks
-from lib.formats import artefact, pictures, scene_import
+from lib.formats import artefact, pictures, scene_import, texture_rows
 from lib.formats.scene_view import scene_camera
+from lib.maps.base_texture import coordinates, wraps
+from lib.maps.mesh_texture import Pyramid
 from lib.report import first_look
 from lib.report.first_look import Side, Thing
+from lib.report.painting import Painting
 from lib.surfaces.coarse import coarse
 
 LINES = 33  # of a curved surface
@@ -28,6 +32,7 @@ LINES = 33  # of a curved surface
 def arguments(parser):
     parser.add_argument("--scene-slice", required=True, metavar="FILE", help="geometry-<hash>.json")
     parser.add_argument("--materials", required=True, metavar="FILE", help="JSON: rho_avg of every surface")
+    parser.add_argument("--textures", required=True, metavar="FILE", help="JSON: pictures of surfaces")
     parser.add_argument("--settings", type=door.json_text, default={}, metavar="JSON")
     parser.add_argument("--out", required=True, metavar="FILE", help="PNG to write")
 
@@ -40,7 +45,7 @@ def body(args, cost):
     told, rho_avg = args.settings, artefact.read_json(args.materials)["rho_avg"]
     camera, exposure = told.get("camera"), told.get("exposure", "auto")
     image = first_look.draw(
-        things(x, rho_avg),
+        things(x, rho_avg, *paintings(x, *texture_rows.read(args.textures))),
         view=scene_camera(camera, told) if camera else None,
         exposure=None if exposure == "auto" else float(exposure),
         reflections=told.get("bounces", "converge") != 1,
@@ -50,18 +55,41 @@ def body(args, cost):
     print(f"first look: {args.out}", flush=True)
 
 
-def things(x, rho_avg):
-    """The things of a Scene x, a back being one with its front."""
+def paintings(x, textures, emission):
+    """{surface: Painting} of reflectance and of exitance of a Scene x, by texture_rows; a file is read once."""
+    read = cache(lambda *source: Pyramid(pictures.read_linear(*source)))
+    surface = dict(zip(x.names, x.surfaces, strict=True))
+
+    def painting(name, row, most):
+        factor = np.ones(3) if row.get("factor") is None else np.array(row["factor"])
+        picture, repeat = read(row["file"], row["colour_space"], None, most), np.array(row["repeat"])
+        return Painting(picture, repeat, factor, wraps(surface[name], repeat))
+
+    return (
+        {name: painting(name, row, most) for name, row in rows.items()}
+        for rows, most in ((textures, 1.0), (emission, pictures.ANY))
+    )
+
+
+def things(x, rho_avg, textures, emission):
+    """The things of a Scene x, a back being one with its front; textures, emission : {surface: Painting}."""
     fronts = np.flatnonzero(x.front < 0).tolist()
     back = {int(front): s for s, front in enumerate(x.front) if front >= 0}
+
+    def side(s):
+        name = x.names[s]
+        reflects = x.role[s] != "cast_only"
+        return Side(x.E[s], np.array(rho_avg[name]), reflects, emission.get(name), textures.get(name))
+
     out = []
-    for s, (V, F) in zip(fronts, forks.mapped(lambda s: coarse(x.surfaces[s], LINES), fronts), strict=True):
-        front, other = (
-            None if k is None else Side(x.E[k], np.array(rho_avg[x.names[k]]), x.role[k] != "cast_only")
-            for k in (s, back.get(s))
-        )
+    cut = forks.mapped(lambda s: coarse(x.surfaces[s], LINES), fronts)
+    for s, (V, F, UV) in zip(fronts, cut, strict=True):
+        sides = [side(k) for k in (s, back.get(s)) if k is not None]
+        T = coordinates(x.surfaces[s], F, UV) if any(one.E_picture or one.rho_picture for one in sides) else None
         V = np.stack([V[:, 0], V[:, 2], -V[:, 1]], axis=1) if x.up == "z" else V
-        out.append(Thing(V, F[:, ::-1] if x.flip[s] else F, front, other, blocks=x.role[s] != "receive_only"))
+        if x.flip[s]:
+            F, T = F[:, ::-1], None if T is None else T[:, ::-1]
+        out.append(Thing(V, F, *sides, blocks=x.role[s] != "receive_only", T=T))
     return out
 
 

@@ -19,7 +19,7 @@ def lit_sides(placed, table, asked):
 
     table : rows of scene_table
     """
-    parts = forks.mapped(lambda one: coarse(one.surface), placed)
+    parts = forks.mapped(lambda one: coarse(one.surface)[:2], placed)
     start = np.cumsum([0, *(len(V) for V, _ in parts)])
     V = np.concatenate([V for V, _ in parts])
     F = np.concatenate(

@@ -93,7 +93,9 @@ def _cells(surface, picture, repeat, lines=()):
 
 
 def wraps(surface, repeat):
-    """Return (bool, bool): the picture goes round at the border of u, of v."""
+    """Return (bool, bool): the picture goes round at the border of u, of v; on meshes it does."""
+    if isinstance(surface, Mesh):
+        return True, True
     closed, (_, u1, _, v1) = is_closed(whole(surface)), _box_of(surface)
     return bool(repeat[0] > 1 or closed[0] or u1 > 1), bool(repeat[1] > 1 or closed[1] or v1 > 1)
 
@@ -163,6 +165,17 @@ def _border_cells(surface, edges_u, edges_v):
     on = A[row] + t[:, None] * (B - A)[row]
     i, j = (np.searchsorted(edges[1:-1], x, side="right") for edges, x in ((edges_u, on[:, 0]), (edges_v, on[:, 1])))
     return np.divmod(np.unique(j * (len(edges_u) - 1) + i), len(edges_u) - 1)
+
+
+def coordinates(surface, F, UV):
+    """Where a picture lies on triangles of a surface: (m, 3, 2) of their corners, (0, 0) its lower left.
+
+    F (m, 3), UV (n, 2) of their corners in the surface's [0, 1] x [0, 1]; not asked of a Mesh, whose own they are
+    """
+    if isinstance(surface, Mesh):
+        return surface.T
+    start, length = np.transpose(list(_parts(_box_of(surface))))
+    return (start + UV * length)[F]
 
 
 def on_map(surface, picture, repeat, w, h):

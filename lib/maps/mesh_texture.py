@@ -36,16 +36,17 @@ class Pyramid:
             self._levels.append(np.asarray(half, dtype=np.float32))
         return self._levels[k]
 
-    def values(self, T, width):
-        """The picture at T (n, 2), over about `width` (n,) of its pixels: (n, 3) float32."""
+    def values(self, T, width, wrap=(True, True)):
+        """The picture at T (n, 2), over about `width` (n,) of its pixels: (n, 3) float32.  Along s, t it repeats beyond
+        [0, 1], or its border does."""
         last = int(self.size.max()).bit_length() - 1
         level = np.clip(np.round(np.log2(np.maximum(width, 1.0))), 0, last).astype(np.int64)
         found = np.empty((len(T), 3), dtype=np.float32)
         for k in np.unique(level):
             some = np.flatnonzero(level == k)
             picture = self.level(int(k))
-            x, y = (T[some] % 1.0 * picture.shape[1::-1]).T
-            found[some] = bilinear(picture, x, y)
+            x, y = (np.where(wrap, T[some] % 1.0, T[some]) * picture.shape[1::-1]).T
+            found[some] = bilinear(picture, x, y, wrap)
         return found
 
 

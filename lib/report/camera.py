@@ -42,6 +42,10 @@ class Camera:
         direction = direction.reshape(-1, 3)
         return np.broadcast_to(eye, direction.shape), direction
 
+    def pixel(self, height):
+        """Width of one of `height` rows of pixels, on a plane across the axis of view at the distance 1."""
+        return 2 * np.tan(np.radians(self.fov) / 2) / height
+
 
 def automatic(model, fov=50.0):
     """A camera that shows most of a model: inside where it is a room, outside where it is an object.

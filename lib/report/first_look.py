@@ -2,8 +2,8 @@
 
 Direct light is asked for at every pixel, reflected light by a path from one pixel in four (lib.visibility.paths); both
 are then smoothed over the plane that a pixel shows, by edge-avoiding wavelets (Dammertz et al. 2010).
-Surfaces are of triangles, coarse where they are curved, and have their average reflectance. For placing lamps and the
-camera; no figure of the bake hangs on it.
+Surfaces are of triangles, coarse where they are curved; pictures are on what the camera sees, paths meet averages. For
+placing lamps and the camera; no figure of the bake hangs on it.
 """
 
 from dataclasses import dataclass
@@ -17,6 +17,7 @@ from lib.maps import display
 from lib.maps.colour import linear_to_srgb
 from lib.report import camera as cameras
 from lib.report import picture
+from lib.report.painting import Painting
 from lib.report.smoothing_kernels import smooth
 from lib.visibility.paths import Room, lamps_of
 from lib.visibility.tracer import Tracer
@@ -32,11 +33,14 @@ WHITE = 0.99  # of the pixels stay below it; a bake's is that of its surfaces' a
 
 @dataclass(frozen=True)
 class Side:
-    """One side of a surface: exitance E (3,) [W/m^2], average reflectance rho (3,), and if its light reaches others."""
+    """One side of a surface: average exitance E (3,) [W/m^2] and reflectance rho (3,), if its light reaches others, and
+    the pictures that the two are averages of: None for even ones."""
 
     E: np.ndarray
     rho: np.ndarray
     reflects: bool = True
+    E_picture: Painting | None = None
+    rho_picture: Painting | None = None
 
 
 NO_SIDE = Side(np.zeros(3), np.zeros(3), reflects=False)
@@ -48,6 +52,7 @@ class Thing:
 
     V (n, 3) metres, y up; F (m, 3) int, counterclockwise seen from the front
     front, back : its Sides; None for a back that is not seen;  blocks : it casts shadows
+    T (m, 3, 2) : texture coordinates of the triangles' corners, if a side has a picture
     """
 
     V: np.ndarray
@@ -55,6 +60,7 @@ class Thing:
     front: Side
     back: Side | None = None
     blocks: bool = True
+    T: np.ndarray | None = None
 
     @property
     def sides(self):
@@ -135,7 +141,7 @@ def _seen(things, model, room, view, rows, reflections, rng):
     """The Pixels of some rows of the picture."""
     w, h = SIZE
     origin, D = view.rays(w, h, *rows)
-    t, face, _ = picture.first_visible(model, origin, D)
+    t, face, weight = picture.first_visible(model, origin, D)
     hit = np.flatnonzero(face >= 0)
     part, n = model.face_part[face[hit]], len(D)
     N = model.normal[face[hit]]
@@ -144,7 +150,8 @@ def _seen(things, model, room, view, rows, reflections, rng):
     N[is_back] *= -1
     x = (origin[hit] + t[hit, None] * D[hit] - model.mesh.centre) / model.mesh.scale
     side = is_back * len(things) + part
-    E, rho = (np.array([getattr(one.sides[k], name) for k in (0, 1) for one in things]) for name in ("E", "rho"))
+    E, rho = (np.array([getattr(one.sides[k], name) for k in (0, 1) for one in things])[side] for name in ("E", "rho"))
+    _paint(E, rho, side, things, model, face[hit], weight[hit], N, D[hit], t[hit] * view.pixel(h))
 
     direct, indirect = room.direct(x, N, rng, DIRECT_RAYS), np.zeros((len(hit), 3))
     if reflections:
@@ -152,11 +159,27 @@ def _seen(things, model, room, view, rows, reflections, rng):
         some = np.flatnonzero(((row + rows[0]) % 2 == 0) & (column % 2 == 0))
         indirect[some] = room.indirect(x[some], N[some], rng)
     out = []
-    for values in (np.ones((len(hit), 1)), E[side], rho[side], N, x, direct, indirect):
+    for values in (np.ones((len(hit), 1)), E, rho, N, x, direct, indirect):
         whole = np.zeros((n, values.shape[1]), dtype=np.float32)
         whole[hit] = values
         out.append(whole.reshape(-1, w, values.shape[1]))
     return Pixels(out[0][..., 0], *out[1:])
+
+
+def _paint(E, rho, side, things, model, face, weight, N, D, width):
+    """Put the pictures of sides in place of their averages E and rho (m, 3), at hits of rays D on faces with normals N
+    (m, 3) by pixels of `width` (m,) [m]; side (m,) counts fronts, then backs."""
+    first = np.searchsorted(model.face_part, np.arange(len(things)))
+    cosine = np.abs(np.einsum("ij,ij->i", N, D)) / np.linalg.norm(D, axis=1)
+    for k in np.flatnonzero(np.bincount(side, minlength=1)):
+        one = things[k % len(things)]
+        own = one.sides[k // len(things)]
+        for values, painting in ((E, own.E_picture), (rho, own.rho_picture)):
+            if painting is not None:
+                at = np.flatnonzero(side == k)
+                f = face[at]
+                corners = model.mesh.V[model.mesh.F[f]], one.T[f - first[k % len(things)]]
+                values[at] = painting.seen(*corners, weight[at], width[at], cosine[at])
 
 
 def _smoothed(light, known, found, levels):

@@ -13,18 +13,19 @@ LINES = 9
 
 
 def coarse(surface, lines=LINES):
-    """V (n, 3), F (m, 3) int64: of a mesh its own, else cut at LINES of the map, at `lines` if it is curved and has
-    no trims; normals along S_u x S_v.
+    """V (n, 3), F (m, 3) int64, UV (n, 2): of a mesh its own, and None, else cut at LINES of the map, at `lines` if it
+    is curved and has no trims; normals along S_u x S_v.
     """
     if isinstance(surface, Mesh):
-        return surface.V, surface.F.astype(np.int64)
+        return surface.V, surface.F.astype(np.int64), None
     if isinstance(surface, TrimmedSurface):
         return _trimmed(surface)
     n = lines if lines == LINES or not is_planar(surface) else LINES
     corner, t = np.arange(n * n).reshape(n, n), np.linspace(0.0, 1.0, n)
     a, b, c, d = corner[:-1, :-1], corner[:-1, 1:], corner[1:, 1:], corner[1:, :-1]
     F = np.stack([a, b, c, a, c, d], axis=2).reshape(-1, 3)
-    return evaluate_grid(surface, t, t)[0].reshape(-1, 3), F
+    UV = np.stack(np.meshgrid(t, t), axis=2).reshape(-1, 2)
+    return evaluate_grid(surface, t, t)[0].reshape(-1, 3), F, UV
 
 
 def _trimmed(trim):
@@ -33,7 +34,7 @@ def _trimmed(trim):
     uv, F = domain_triangles(_simplified(trim))
     for _ in range(ROUNDS if not is_planar(trim) else 0):
         uv, F = _divided(uv, F)
-    return evaluate(trim.base, uv[:, 0], uv[:, 1])[0], F
+    return evaluate(trim.base, uv[:, 0], uv[:, 1])[0], F, uv
 
 
 def _simplified(trim):

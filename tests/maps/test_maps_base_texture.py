@@ -1,5 +1,7 @@
 """Base textures: averages by area, crossings against pixel centres, light times texture."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,8 @@ from lib.maps.pixels import box_means
 from lib.nurbs.evaluate import evaluate_grid
 from lib.nurbs.shape import collapsed_sides
 from lib.nurbs.surface import bilinear, from_points
+from lib.surfaces.trimmed import TrimmedSurface
+from tests.rooms import cube_mesh
 
 ROUND = 1e-6  # float32 maps
 QUADRATURE = 2e-4  # midpoint rule on 128 cells of a quarter period each: (pi/2/128)^2 and the picture's own pixels
@@ -254,3 +258,16 @@ def test_hidden_samples_take_no_part_in_upsampling():
     assert fine[..., 0].tolist() == [[1, 1, 0, 0, 0], [2, 2, 0, 0, 0], [3, 3, 0, 0, 0]]
     same, same_hidden = bt.upsample(value, hidden, 0)
     assert same[..., 0].tolist() == [[1, 0, 0], [3, 0, 0]] and np.array_equal(same_hidden, hidden)
+
+
+def test_where_a_picture_lies_on_triangles():
+    """Over the whole surface, of which a trimmed one's map shows a box; on a mesh where its own coordinates say."""
+    UV, F = np.array([[0, 0], [1, 0], [0.5, 1.0]]), np.array([[0, 1, 2], [2, 1, 0]])
+    square = bilinear([0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0])
+    assert bt.coordinates(square, F, UV).tolist() == UV[F].tolist()
+    part = TrimmedSurface(square, np.array([0.25, 0.75, 0.5, 1.5]), UV, np.array([0, 3]), np.zeros((3, 3)), np.ones(3))
+    corners = [[0.25, 0.5], [0.75, 0.5], [0.5, 1.5]]
+    assert bt.coordinates(part, F, UV).tolist() == [corners, corners[::-1]]
+    T = np.random.default_rng(4).random((12, 3, 2))
+    mesh = replace(cube_mesh(), T=T)
+    assert bt.coordinates(mesh, None, None) is T and bt.wraps(mesh, (1, 1)) == (True, True)

@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from lib import forks
+from lib.maps.base_texture import coordinates
 from lib.maps.colour import srgb_to_linear
+from lib.maps.mesh_texture import Pyramid
 from lib.report import first_look, picture
 from lib.report.camera import Camera
 from lib.report.first_look import Side, Thing, draw
+from lib.report.painting import Painting
 from lib.report.smoothing_kernels import smooth
 from lib.surfaces.coarse import coarse
 from tests.shapes import box, rectangle, sphere
@@ -25,7 +28,7 @@ def small(monkeypatch):
 
 def thing(surface, E=0.0, rho=0.0, **more):
     """A Thing of a NURBS surface, its front along S_u x S_v."""
-    return Thing(*coarse(surface), Side(np.ones(3) * E, np.ones(3) * rho), **more)
+    return Thing(*coarse(surface)[:2], Side(np.ones(3) * E, np.ones(3) * rho), **more)
 
 
 def floor(rho=0.5, side=2.0):
@@ -200,3 +203,87 @@ def test_smoothing_stops_at_another_plane(normal, lift):
     light[:, :8] = 1
     out, _ = smoothed(light, np.ones((8, 16), np.float32), N, place)
     assert out[:, :8].min() > 0.97 and out[:, 8:].max() < 0.03
+
+
+def quarters(n=32):
+    """A picture of four colours: red and green above, blue and white below."""
+    colour = np.array([[[0.8, 0, 0], [0, 0.8, 0]], [[0, 0, 0.8], [0.8, 0.8, 0.8]]], np.float32)
+    return Painting(Pyramid(colour.repeat(n, axis=0).repeat(n, axis=1)), np.ones(2), np.ones(3))
+
+
+def painted(painting):
+    """The floor with a picture, u along z and v along x, and a lamp far above."""
+    V, triangles, UV = coarse(FLOOR)
+    T = coordinates(FLOOR, triangles, UV)
+    side = Side(np.zeros(3), np.full(3, 0.4), rho_picture=painting)
+    things = [Thing(V, triangles, side, T=T), lamp(9.0, E=2e5)]
+    return light_of(draw(things, ABOVE, exposure=0.5 / np.pi, reflections=False))
+
+
+def corners_seen(light):
+    """Light near the corners of what ABOVE sees: (u, v) = (1, 1), (1, 0), (0, 1) and (0, 0)."""
+    h, w = light.shape[:2]
+    at = [(h // 2 + a * h // 6, w // 2 + b * h // 6) for a in (-1, 1) for b in (-1, 1)]
+    return [light[j - 2 : j + 3, i - 2 : i + 3].mean(axis=(0, 1)) for j, i in at]
+
+
+def test_a_picture_lies_as_the_bake_lays_it():
+    """Its upper left where u is 0 and v is 1; as bright as a plain floor of its colours."""
+    plain = corners_seen(painted(None))
+    factor = np.array([g[0] for g in plain])[:, None] * 2  # of 0.8 over 0.4
+    green, white, red, blue = corners_seen(painted(quarters())) / factor
+    for found, colour in ((green, [0, 1, 0]), (white, [1, 1, 1]), (red, [1, 0, 0]), (blue, [0, 0, 1])):
+        assert found == pytest.approx(colour, abs=0.02)
+
+
+def test_a_picture_repeats_and_has_a_factor():
+    """Two tiles along u: the colours of its left and of its right alternate in each half."""
+    one = quarters()
+    two = replace(one, repeat=np.array([2.0, 1.0]), factor=np.array([0.5, 1, 1]))
+    light = painted(two)
+    w, h = light.shape[1], light.shape[0]
+    column = light[:, w // 2 + h // 6]  # v = 0.2 or so: blue, white, blue, white from the bottom up
+    seen = column[np.abs(np.arange(h) + 0.5 - h / 2) < h * 0.5 / (3 * np.tan(np.radians(30))) * 0.95]
+    quarter = len(seen) // 4
+    white, blue, white_below, blue_below = (
+        seen[k * quarter + 2 : (k + 1) * quarter - 2].mean(axis=0) for k in range(4)
+    )
+    for found in (white, white_below):
+        assert found[0] == pytest.approx(found[2] / 2, rel=0.02) and found[1] == pytest.approx(found[2], rel=0.02)
+    for found in (blue, blue_below):
+        assert found[2] > 0.02 and found[0] == found[1] == 0
+
+
+def test_a_lamp_shines_by_its_picture_where_it_is_seen():
+    V, F, UV = coarse(FLOOR)
+    side = Side(np.full(3, 1.0), np.zeros(3), E_picture=replace(quarters(), factor=np.full(3, 5.0)))
+    image = draw([Thing(V, F, side, T=coordinates(FLOOR, F, UV))], ABOVE, exposure=np.pi / 5)
+    green, white, red, blue = corners_seen(light_of(image))
+    assert green == pytest.approx([0, 0.8, 0], abs=0.01) and white == pytest.approx([0.8] * 3, abs=0.01)
+    assert red == pytest.approx([0.8, 0, 0], abs=0.01) and blue == pytest.approx([0, 0, 0.8], abs=0.01)
+
+
+def test_a_back_has_its_own_picture_on_the_same_place():
+    V, F, UV = coarse(FLOOR)
+    T = coordinates(FLOOR, F, UV)[:, ::-1]
+    back = Side(np.zeros(3), np.full(3, 0.4), rho_picture=quarters())
+    sheet = Thing(V, F[:, ::-1], Side(np.zeros(3), np.zeros(3)), back, T=T)  # turned: its back lies above
+    light = light_of(draw([sheet, lamp(9.0, E=2e5)], ABOVE, exposure=0.5 / np.pi, reflections=False))
+    green, white, red, blue = corners_seen(light)
+    assert green[1] > 0.05 and green[0] == green[2] == 0 and red[0] > 0.05 and blue[2] > 0.05
+    assert white[0] == pytest.approx(white[1], rel=0.02)
+
+
+def test_pixels_show_the_mean_of_what_they_hold():
+    """A chess board of single texels: its colours from near, their mean from afar, more of it the flatter the view."""
+    board = (np.indices((64, 64)).sum(axis=0) % 2)[..., None] * np.ones(3, np.float32)
+    painting = Painting(Pyramid(board.astype(np.float32)), np.ones(2), np.ones(3))
+    corner, T = np.array([[[0, 0, 0], [6.4, 0, 0], [0, 6.4, 0]]]), np.array([[[0, 0], [1, 0], [0, 1.0]]])
+    weight = np.array([[1 - 2 * 20.5 / 64, 20.5 / 64, 20.5 / 64]])  # the middle of a texel
+
+    def at(width, cosine=1.0):
+        return float(painting.seen(corner, T, weight, np.array([width]), np.array([cosine]))[0, 0])
+
+    assert at(0.01) == at(0.1) == board[63 - 20, 20, 0] == 1
+    assert at(0.2) == at(1.0) == pytest.approx(0.5)
+    assert at(0.1, cosine=0.2) == pytest.approx(0.5)

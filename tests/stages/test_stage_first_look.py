@@ -55,6 +55,7 @@ def drawn(tmp_path, monkeypatch, capsys):
         found = preflight.load(folder)
         told = {name: found.settings[name] for name in ("camera", "up")}
         options = ["--scene-slice", found.slices["geometry"], "--materials", found.slices["materials"]]
+        options += ["--textures", found.slices["textures"]]
         options += ["--settings", json.dumps({**told, "units": "m", "exposure": 0.3}), "--out", "look.png"]
         assert first_look.main(options) == 0 and "first look: look.png" in capsys.readouterr().out
         return pictures.read_linear("look.png", "srgb")
@@ -105,9 +106,45 @@ def test_things_of_a_scene(tmp_path):
     found = preflight.load(tmp_path, results_root=tmp_path / "results")
     x = scene_import.read(read_json(found.slices["geometry"]), tmp_path, "scene.yaml", charts=False)
     assert x.names == ["floor", "lamp", "left", "left/back", "right"]
-    floor, lamp, left, right = first_look.things(x, found.rho_avg)
+    floor, lamp, left, right = first_look.things(x, found.rho_avg, {}, {})
     assert (floor.blocks, lamp.blocks, left.blocks, right.blocks) == (False, True, True, True)
     assert (floor.front.reflects, left.front.reflects, right.front.reflects) == (True, True, False)
     assert left.back.rho.tolist() == [0.7, 0, 0] and floor.back is None
     assert (lamp.front.E == 10).all() and not left.front.E.any()
     assert floor.V.min(axis=0).tolist() == [-1, 0, -2] and floor.V.max(axis=0).tolist() == [1, 0, 0]
+
+
+def halves(path, left, right):
+    """A picture of two colours, 8-bit linear."""
+    image = np.zeros((8, 16, 3), np.uint8)
+    image[:, :8], image[:, 8:] = left, right
+    pictures.write_png8(path, image)
+
+
+def test_pictures_of_materials_and_of_lamps(drawn, tmp_path):
+    """Red is left in the picture, blue right: on the floor u goes to the right, on the right wall, which is turned by
+    `flip`, into the depth, so red is near; the floor as a mesh says the same by its texture coordinates.  Of the lamp,
+    whose u goes into the depth as well, the near half is red, the far one green.
+    """
+    (tmp_path / "room").mkdir()
+    halves(tmp_path / "room/tiles.png", [200, 0, 0], [0, 0, 200])
+    halves(tmp_path / "room/lamp.png", [255, 0, 255], [0, 255, 255])
+    text = Z_UP.replace("v: [0, 2, 0]}}", "v: [0, 2, 0]}, material: tiles}").replace(
+        "material: green", "material: tiles"
+    )
+    tiles = "  tiles: {texture: tiles.png, colour_space: linear}\n"
+    text = text.replace("  lamp: {", tiles + "  lamp: {emission_texture: lamp.png, ")
+    mesh = "v -1 0 0\nv 1 0 0\nv 1 2 0\nv -1 2 0\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3\nf 1/1 3/3 4/4\n"
+    floor = "rectangle: {origin: [-1, 0, 0], u: [2, 0, 0], v: [0, 2, 0]}"
+    for written in (text, text.replace(floor, "file: floor.obj")):
+        light = drawn(written, floor_obj=mesh)
+        near, far = light[150:250, 475:490].mean(axis=(0, 1)), light[150:250, 440:450].mean(axis=(0, 1))
+        left, right = light[340:360, 240:310].mean(axis=(0, 1)), light[340:360, 330:400].mean(axis=(0, 1))
+        for red, blue in ((left, right), (near, far)):
+            assert red[0] > 0.01 and red[2] == 0 and blue[2] > 0.01 and blue[0] == 0
+        rows = light[30:90, 310:330].mean(axis=1)
+        lamp = rows[rows[:, 2] > 0.3]
+        assert len(lamp) > 20 and (lamp[:3, 0] > 0.3).all() and (lamp[-3:, 1] > 0.3).all()
+        assert not lamp[:3, 1].any() and not lamp[-3:, 0].any()
+        if written is text:  # a mesh's pictures go round
+            assert not light[360:375, 170:300, 2].any() and not light[360:375, 350:470, 0].any()

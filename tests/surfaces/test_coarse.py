@@ -3,15 +3,17 @@
 import numpy as np
 import pytest
 
+from lib.nurbs.evaluate import evaluate
 from lib.surfaces.coarse import coarse
 from lib.surfaces.trimmed import TrimmedSurface
+from tests.rooms import cube_mesh
 from tests.shapes import rectangle, sphere
 from tests.surfaces.trimmed_shapes import octant
 
 
 def areas(surface):
     """Vectors of the triangles: half the cross products."""
-    V, F = coarse(surface)
+    V, F, _ = coarse(surface)
     return np.cross(V[F[:, 1]] - V[F[:, 0]], V[F[:, 2]] - V[F[:, 0]]) / 2
 
 
@@ -37,3 +39,14 @@ def test_a_disc_cut_out_of_a_square():
 def test_the_inside_of_a_curved_trimmed_surface_bulges():
     """An octant of the unit sphere: its area is pi / 2, that of the flat triangle between its corners 0.87."""
     assert np.linalg.norm(areas(octant()), axis=1).sum() == pytest.approx(np.pi / 2, rel=0.05)
+
+
+def test_parameters_of_the_corners():
+    """Those of the map, a trimmed surface's being its box; meshes keep their own triangles and have none."""
+    trim = octant()
+    for surface, base in ((sphere(), sphere()), (rectangle([0, 0, 0], [2, 0, 0], [1, 3, 0]),) * 2, (trim, trim.base)):
+        V, F, UV = coarse(surface)
+        assert V == pytest.approx(evaluate(base, *UV.T)[0]) and F.max() == len(V) - 1
+    mesh = cube_mesh()
+    V, F, UV = coarse(mesh)
+    assert np.array_equal(V, mesh.V) and np.array_equal(F, mesh.F) and UV is None
