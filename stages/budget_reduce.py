@@ -3,7 +3,8 @@
 reads   textured maps of every chunk, casters.npz (closed directions)     (lib.formats.textured_maps, .casters)
         settings: {"budget": bytes, "profile": "standard" or "lightmap", "order": "loss" or "loss_per_byte"}
 writes  textures.npz, all surfaces                                         (lib.formats.textured_maps)
-        budget.json: S before and after, who gave up what; the automatic exposure of the textures before
+        budget.json: S before and after, who gave up what, the error that this makes; the automatic exposure of the
+        textures before
 
 `standard` exports light on its base texture and reduces those maps; `lightmap` exports and reduces the light alone,
 and the base textures count as fixed bytes.  `loss` takes the smallest D_i first, as the paper does; `loss_per_byte` the
@@ -19,6 +20,7 @@ from lib.maps import budget, exposure
 from lib.refusal import Refusal
 
 PROFILES = {"standard": "final", "lightmap": "light"}
+MUCH = 0.03  # of the light: an error worth a warning, if the other order halves it at least
 
 
 def arguments(parser):
@@ -44,9 +46,17 @@ def body(args, cost):
     fixed = 0 if profile == "standard" else sum(budget.gpu_bytes(w, h) for w, h in x.pictures.values())
 
     after, steps, D = budget.reduce(before, is_closed[before.surface], T, fixed, order)
+    area = shapes.area[before.surface]
+    lost = budget.lost(before, after, area) if steps else 0.0
+    if order == "loss" and lost > MUCH:
+        other = budget.reduce(before, is_closed[before.surface], T, fixed, "loss_per_byte")[0]
+        if (less := budget.lost(before, other, area)) < lost / 2:
+            off, by_bytes = (f"{100 * share:.2g} %" for share in (lost, less))
+            wish = "export: {budget_order: loss_per_byte}"
+            door.warn(f"budget: the textures that fit it are {off} off on average, {by_bytes} with `{wish}`")
 
     textured_maps.save(args.out, dataclasses.replace(x, **{PROFILES[profile]: after}))
-    record = table(x.names, profile, order, T, fixed, before, after, steps, D)
+    record = table(x.names, profile, order, T, fixed, before, after, steps, D) | {"lost": lost}
     # Brightness is that of the whole light: a smaller budget must not change it.
     write_json(
         args.table, {**record, "exposure": exposure.automatic(textured_maps.reflected(x), shapes.area[x.final.surface])}

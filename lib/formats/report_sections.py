@@ -216,10 +216,11 @@ def budget(figures):
     if not memory["budget"]:
         return ""
     used = memory["after"] / memory["budget"]
+    error = f" They are {100 * memory['lost']:.2g} % off on average." if memory["lost"] else ""
     line = (
         f"<p><b>{size(memory['after'])}</b> of {size(memory['budget'])} allowed are used ({share(used)}); before "
-        f"the reduction {size(memory['before'])}. On disk the textures take {size(memory['disk'])}.</p>"
-        f"{bar(used, 'bar wide')}"
+        f"the reduction {size(memory['before'])}. On disk the textures take {size(memory['disk'])}."
+        f"{error}</p>{bar(used, 'bar wide')}"
     )
     columns = [
         ("surface", "t", lambda r: escape(str(r["name"]))),
@@ -229,8 +230,9 @@ def budget(figures):
         ("saved", "n", lambda r: (size(r["saved"]), r["saved"])),
         ("D<sub>i</sub> given up", "n", lambda r: (number(r["D_i"]), r["D_i"])),
     ]
+    least = "loses least for the bytes it frees" if memory["order"] == "loss_per_byte" else "loses least"
     note = (
-        "GPU bytes as exported, mip chains included. The surface that loses least, by the sum of what its deepest "
+        f"GPU bytes as exported, mip chains included. The surface that {least}, by the sum of what its deepest "
         "samples add, gives up its deepest level first."
     )
     listing = table(columns, figures["budget"], is_sortable=True) or "<p>No map gave anything up.</p>"

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from lib.maps.base_texture import upsample
 from lib.maps.mapset import pack, side_lengths
 from lib.refusal import Refusal
 
@@ -226,3 +227,23 @@ def reduce(maps, closed, budget, fixed=0, order="loss"):
     if not steps:
         return maps, steps, D
     return pack(maps.surface, maps.roots, level, value, hidden), steps, D
+
+
+def lost(before, after, area):
+    """Return the mean error of reduced maps, stretched to their size before as viewers do, over the mean of what was.
+
+    before, after : MapSets of the same surfaces;  area : (m,) of the surfaces, which the means are taken over
+    """
+    error, light = 0.0, 0.0
+    for k, share in enumerate(np.asarray(area, np.float64)):
+        value, seen = before.map(k), ~before.hidden_map(k)
+        if not seen.any():
+            continue
+        each = share / (3 * np.count_nonzero(seen))
+        light += each * np.einsum("jic,ji->", value, seen, dtype=np.float64)
+        levels = int(before.level[k] - after.level[k])
+        if levels:
+            shown, _ = upsample(after.map(k), after.hidden_map(k), levels)
+            shown -= value
+            error += each * np.einsum("jic,ji->", np.abs(shown, out=shown), seen, dtype=np.float64)
+    return error / light if light > 0 else 0.0

@@ -242,7 +242,8 @@ def collect(name, bake, settings, run):
     settings : {"settings": what the bake used or None, "warnings": [text]}; run : id of the run, "" for none
     """
     scene, solution = bake.scene, bake.solution
-    table = bake.budget or {"T": None, "S_before": None, "S_after": None, "surfaces": [], "profile": "standard"}
+    none = dict.fromkeys(("T", "S_before", "S_after", "order", "lost"))
+    table = bake.budget or {**none, "surfaces": [], "profile": "standard"}
     exported_maps = getattr(bake.textures, "light" if table["profile"] == "lightmap" else "final", None)
     mean_H = float(np.max(solution.mean_H)) if solution is not None else 0.0  # as the thresholds have it
     D_i, ways = {s["surface"]: s["D"] for s in table["surfaces"]}, settings.get("reconstruction", {})
@@ -258,6 +259,8 @@ def collect(name, bake, settings, run):
         "before": table["S_before"],
         "after": table["S_after"],
         "disk": bake.lods.get("texture_bytes"),
+        "order": table["order"],
+        "lost": table["lost"],
     }
     unshot = float(history[-1, 1]) if len(history) else None
     return {

@@ -260,3 +260,18 @@ def test_a_budget_that_is_no_number_of_bytes_is_refused_with_the_smallest_total(
 def test_no_maps_at_all():
     empty = pack([], [], [], [])
     assert budget.reduce(empty, np.zeros((0, 2), bool), 100)[1] == []
+
+
+def test_what_is_lost_is_the_mean_error_over_the_area():
+    """A spike of 4 on a map of 1, hidden in a corner, gone at the roots, beside a map of 2 that stays."""
+    spike, even = np.ones((3, 3, 3)), np.full((3, 3, 3), 2.0)
+    spike[1, 1], spike[0, 0] = 5, 100
+    hidden = np.zeros((3, 3), bool)
+    hidden[0, 0] = True
+    before = pack([0, 3], [[1, 1]] * 2, [1, 1], [spike, even], [hidden, np.zeros_like(hidden)])
+    corner = hidden[::2, ::2]
+    after = pack([0, 3], [[1, 1]] * 2, [0, 1], [np.ones((2, 2, 3)), even], [corner, np.zeros_like(hidden)])
+    assert budget.lost(before, before, [3.0, 5.0]) == 0
+    assert budget.lost(before, after, [3.0, 5.0]) == pytest.approx(3 * 4 / 8 / (3 * 12 / 8 + 5 * 2))
+    black = pack([0], [[1, 1]], [1], [np.zeros((3, 3, 3))])
+    assert budget.lost(black, pack([0], [[1, 1]], [0], [np.zeros((2, 2, 3))]), [1.0]) == 0

@@ -1,5 +1,6 @@
 """budget_reduce through its door: two chunks, one budget."""
 
+import dataclasses
 import json
 
 import numpy as np
@@ -86,7 +87,7 @@ def test_a_budget_that_holds_changes_nothing(tmp_path):
     status, out, table = run(tmp_path, options, budget=FULL)
     assert status == 0 and out.names == ["apple", "table", "wall"] and out.final.level.tolist() == [4, 5, 5]
     assert np.array_equal(out.final.map(1), textured_maps.load(tmp_path / "1.npz").final.map(0))
-    assert table["S_before"] == table["S_after"] == FULL and table["steps"] == []
+    assert table["S_before"] == table["S_after"] == FULL and table["steps"] == [] and table["lost"] == 0
 
 
 def test_the_least_detail_is_given_up_and_the_table_says_who(tmp_path):
@@ -139,3 +140,26 @@ def test_an_unknown_profile_or_order_is_refused(tmp_path, capsys):
     assert "order: 'size', allowed are loss and loss_per_byte" in capsys.readouterr().err
     assert run(tmp_path, build(tmp_path), budget=FULL, profile="fast")[0] == 1
     assert "profile: 'fast', allowed are standard and lightmap" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("contrast, is_told", [(0.5, True), (0.04, False)])
+def test_where_the_order_loses_much_a_warning_says_what_the_other_would(tmp_path, capsys, contrast, is_told):
+    """A small apple of chess board, and a wall of faint noise that counts more in sum: by the paper's rule the apple
+    gives up all of it for a few bytes, and the wall has to go down nevertheless."""
+    options, rng = build(tmp_path), np.random.default_rng(2)
+    board = 1 + contrast * (np.indices((5, 5)).sum(axis=0) % 2 * 2 - 1)[..., None] * np.ones(3)
+    wall = 1 + 0.1 * rng.random((33, 33, 3))
+    x = textured_maps.load(tmp_path / "0.npz")
+    final = pack([0, 2], [[1, 1]] * 2, [2, 5], [board, wall])
+    textured_maps.save(tmp_path / "0.npz", dataclasses.replace(x, final=final))
+    x = textured_maps.load(tmp_path / "1.npz")
+    textured_maps.save(tmp_path / "1.npz", dataclasses.replace(x, final=pack([1], [[1, 1]], [0], [np.ones((2, 2, 3))])))
+    T = sum(budget.gpu_bytes(n, n) for n in (2, 5, 17))
+    _, _, table = run(tmp_path, options, budget=T)
+    said = capsys.readouterr().err
+    assert ("export: {budget_order: loss_per_byte}" in said) == is_told == (table["lost"] > 0.03)
+    _, out, by_bytes = run(tmp_path, options, budget=T, order="loss_per_byte")
+    assert out.final.level.tolist() == [2, 0, 4] and 0 < by_bytes["lost"] < 0.01
+    assert not capsys.readouterr().err
+    if is_told:
+        assert f"{100 * table['lost']:.2g} % off" in said and f"{100 * by_bytes['lost']:.2g} % with" in said

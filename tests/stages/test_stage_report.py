@@ -144,6 +144,8 @@ def make(folder):
             "S_after": 64,
             "S_smallest": 64,
             "fixed": 0,
+            "order": "loss_per_byte",
+            "lost": 0.0216,
             "steps": [],
             "surfaces": [
                 {**row, "surface": NAMES[0], "D": 1.5},
